@@ -9,7 +9,7 @@ import pytest
 
 from lockstep.bench.harness.free_port import free_port
 from lockstep.bench.link_transports import ends
-from lockstep.bench.link_transports.ends import CHAIN, KEY, RepeatTimer, run_console, run_robot
+from lockstep.bench.link_transports.ends import CHAIN, KEY, run_console, run_robot
 from lockstep.bench.link_transports.messages import framed, picture_bytes, take_frames
 from lockstep.bench.link_transports.transports import KINDS, Kind
 from lockstep.server.http.transport.tls import self_signed
@@ -46,13 +46,3 @@ def test_messages_are_cut_out_whole() -> None:
 def test_a_second_of_pictures_is_the_rate_and_a_keyframe_is_larger() -> None:
     assert sum(map(picture_bytes, range(100))) * 8 / 4 == pytest.approx(500_000, rel=0.01)
     assert picture_bytes(100) > 5 * picture_bytes(101)
-
-
-def test_the_time_until_a_repeat_follows_the_trips_within_its_bounds() -> None:
-    timer = RepeatTimer()
-    for _ in range(50):
-        timer.observe(0.1)
-    assert timer.seconds == pytest.approx(0.1, abs=0.01)
-    for _ in range(100):
-        timer.observe(0.001)
-    assert timer.seconds == ends.FLOOR

@@ -83,14 +83,41 @@ async def test_two_that_are_open_in_one_moment_are_one_connection() -> None:
     assert openings.discarded == ["second"]
 
 
-async def test_a_refusal_ends_the_race() -> None:
-    openings = Openings(NOW)
+async def test_a_refusal_ends_the_race_of_one() -> None:
+    openings = Openings(NEVER)
     race = openings.race()
-    await openings.wait_for(2)
+    await openings.wait_for(1)
     openings.ways[0].set_exception(ConnectionRefusedError("no"))
     with pytest.raises(ConnectionRefusedError):
         await race
-    assert openings.cancelled == len(openings.ways) - 1
+
+
+async def test_one_that_fails_leaves_the_other_to_be_opened_and_the_first_error_counts() -> None:
+    openings = Openings(NOW)
+    race = openings.race()
+    await openings.wait_for(2)
+    openings.ways[1].set_exception(ConnectionRefusedError("too many"))
+    await asyncio.sleep(0)
+    openings.ways[0].set_result("first")
+    assert await race == "first"
+    openings = Openings(NOW)
+    race = openings.race()
+    await openings.wait_for(2)
+    openings.ways[1].set_exception(ConnectionRefusedError("first"))
+    await asyncio.sleep(0)
+    openings.ways[0].set_exception(ConnectionResetError("second"))
+    with pytest.raises(ConnectionRefusedError, match="first"):
+        await race
+
+
+async def test_a_race_that_is_cancelled_begins_no_other() -> None:
+    openings = Openings(0.01)
+    race = openings.race()
+    await openings.wait_for(1)
+    race.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await race
+    assert len(openings.ways) == 1
 
 
 def test_a_handshake_is_late_after_more_round_trips_than_it_takes() -> None:

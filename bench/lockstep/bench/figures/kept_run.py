@@ -11,6 +11,14 @@ from lockstep.bench.figures.machine import machine_facts
 __all__ = ["kept_run"]
 
 
+FILE = "--json"  # where the run is written, which is nobody else's place
+
+
+def _without_file(arguments: Sequence[str]) -> list[str]:
+    at = arguments.index(FILE) if FILE in arguments else len(arguments)
+    return [*arguments[:at], *arguments[at + 2 :]]
+
+
 def kept_run(busy: float, runs: Sequence[Any]) -> dict[str, Any]:
     """Return the runs with the date, this process' command, and the machine.
 
@@ -20,7 +28,7 @@ def kept_run(busy: float, runs: Sequence[Any]) -> dict[str, Any]:
     module = "" if spec is None else spec.name.removesuffix(".__main__")
     return {
         "at": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "command": shlex.join(["python", "-m", module, *sys.argv[1:]]),
+        "command": shlex.join(["python", "-m", module, *_without_file(sys.argv[1:])]),
         "machine": machine_facts(),
         "busy_percent": round(busy),
         "runs": list(runs),

@@ -12,7 +12,8 @@ from typing import Annotated
 
 import typer
 
-from lockstep.bench.figures.machine import busy_percent, machine_facts
+from lockstep.bench.figures.kept_run import kept_run
+from lockstep.bench.figures.machine import busy_percent
 from lockstep.bench.first_drive.run import drive_discovered, drive_template
 
 __all__ = ["app"]
@@ -32,13 +33,14 @@ def first_drive(
 ) -> None:
     """Drive a robot of one's own from the template, and one behind ROS 2 whose file is written from its topics."""
     busy = asyncio.run(busy_percent(LOOK_SECONDS))
-    found: dict[str, object] = {"machine": machine_facts() | {"busy_percent_before": round(busy, 1)}}
+    found: list[dict[str, object]] = []
     with TemporaryDirectory(prefix="lockstep-first-drive-") as folder:
-        found["template"] = asyncio.run(drive_template(Path(folder), _say))
+        found.append({"way": "template", "seconds": asyncio.run(drive_template(Path(folder), _say))})
     if ros_python:
         with TemporaryDirectory(prefix="lockstep-first-drive-") as folder:
-            found["discovered"] = asyncio.run(drive_discovered(Path(folder), ros_python, node.resolve(), _say))
-    print(json.dumps(found, indent=1))
+            seconds = asyncio.run(drive_discovered(Path(folder), ros_python, node.resolve(), _say))
+            found.append({"way": "ros2 discover", "seconds": seconds})
+    print(json.dumps(kept_run(busy, found), indent=1))
 
 
 def _say(text: str) -> None:

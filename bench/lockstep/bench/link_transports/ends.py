@@ -1,7 +1,8 @@
 """The ends, each a process: `python -m lockstep.bench.link_transports.ends robot|console KIND HOST PORT SECONDS DIR`.
 
 The console sends a command, waits for its feedback, and sends the next; over datagrams both are repeated as Lockstep's
-commands are. The robot sends pictures and answers commands, each once. The console prints what it measured as JSON.
+commands are, and `tls-asked` pings as the console does. The robot sends pictures and answers commands, each once. The
+console prints what it measured as JSON.
 """
 
 import asyncio
@@ -23,13 +24,15 @@ from lockstep.bench.link_transports.messages import (
     picture_bytes,
 )
 from lockstep.bench.link_transports.transports import Kind, Link, console_link, robot_link
+from lockstep.protocol.messages import Command, Feedback
+from lockstep.protocol.pacing.repeat_timer import RepeatTimer
+from lockstep.robot_bridge.link.asking import Asking
 
 __all__ = ["ConsoleEnd", "RobotEnd", "run_console", "run_robot"]
 
 CHAIN, KEY = "chain.pem", "key.pem"
-FLOOR, CAP = 0.02, 0.5  # s, of the time until a command is repeated
 PING, PING_BYTES = 0xFFFFFFFF, 40
-REPEATING: tuple[Kind, ...] = ("tls-asked", "quic-datagrams")
+SHORTEST = 0.001  # s
 WARM_UP = 3.0  # s that are not counted
 
 
@@ -66,23 +69,6 @@ class ConsoleEnd:
         self.pictures.append((message.number, message.sent, time.monotonic()))
 
 
-class RepeatTimer:
-    """RFC 6298, with the floor and cap of Lockstep's commands; a repeated command tells nothing (Karn)."""
-
-    def __init__(self) -> None:
-        self.seconds = 0.2
-        self._smooth: float | None = None
-        self._vary = 0.0
-
-    def observe(self, trip: float) -> None:
-        if self._smooth is None:
-            self._smooth, self._vary = trip, trip / 2
-        else:
-            self._vary += (abs(trip - self._smooth) - self._vary) / 4
-            self._smooth += (trip - self._smooth) / 8
-        self.seconds = min(CAP, max(FLOOR, self._smooth + 4 * self._vary))
-
-
 async def run_robot(kind: Kind, host: str, port: int, folder: Path) -> None:
     """Send pictures and answer until cancelled."""
     end = RobotEnd()
@@ -103,7 +89,7 @@ async def run_console(
 
     Return in ms the trips of commands, and the delays of pictures until they could be shown.
     """
-    end, timer = ConsoleEnd(), RepeatTimer()
+    end, timer, asking = ConsoleEnd(), RepeatTimer(), Asking()
     async with console_link(kind, host, port, folder / CHAIN, folder / KEY, end, listening) as link:
         await end.begun.wait()
         began = time.monotonic()
@@ -112,17 +98,26 @@ async def run_console(
             end.answered.clear()
             link.send_control(framed(end.waits_for, COMMAND_BYTES))
             repeats = 0
-            repeat = (PING, PING_BYTES) if kind == "tls-asked" else (end.waits_for, COMMAND_BYTES)
+            asking.sent(Command(event=end.waits_for, issue=1, nonce=0, values=[]), sent)
             while not end.answered.is_set():
                 with suppress(TimeoutError):
-                    wait = min(CAP, timer.seconds * 2**repeats) if kind in REPEATING else 30.0
+                    now = time.monotonic()
+                    if kind == "tls-asked" and asking.at is not None:
+                        wait = max(SHORTEST, asking.at - now)
+                    else:
+                        wait = timer.wait(repeats + 1) if kind == "quic-datagrams" else 30.0
                     await asyncio.wait_for(end.answered.wait(), wait)
                     break
-                repeats += 1
-                link.send_control(framed(*repeat))
+                if kind == "tls-asked":
+                    link.send_control(framed(PING, PING_BYTES))
+                    asking.asked(time.monotonic())
+                else:
+                    repeats += 1
+                    link.send_control(framed(end.waits_for, COMMAND_BYTES))
+            asking.received(Feedback(event=end.waits_for, issue=1, time=0.0, axes=[]), time.monotonic())
             trip = time.monotonic() - sent
             if not repeats:
-                timer.observe(trip)
+                timer.sample(trip)
             if sent > began + WARM_UP:
                 end.trips.append(trip)
             await asyncio.sleep(max(0.0, sent + EVENT_SECONDS - time.monotonic()))

@@ -1,4 +1,4 @@
-"""`python -m lockstep.bench.robot_cuts.operator LINK CA FILE`: an operator who always holds the stick.
+"""`python -m lockstep.bench.robot_cuts.operator LINK CA FILE`: an operator who watches and always holds the stick.
 
 Each intention differs a little from the last and is written to the file as `[time, value]`, so that the robot's log
 tells when an executed one was formed.
@@ -29,7 +29,7 @@ async def hold(link: str, authority: Path, file: Path) -> None:
         while True:
             with contextlib.suppress(ConsoleError):
                 async with Console(
-                    link, video=False, audio=False, silence_seconds=SILENCE, tls_ca=authority, name="operator"
+                    link, decode=False, silence_seconds=SILENCE, tls_ca=authority, name="operator"
                 ) as console:
                     await _drive(console, intentions.write, marks)
             await asyncio.sleep(STEP)

@@ -155,6 +155,7 @@ async def _driven(place: _Place, way: Way) -> AsyncIterator[None]:
     robot = [
         *(sys.executable, "-m", "lockstep.robot_bridge", "planar", "--json"),
         *("--event-log", str(place.log), "--state-dir", str(folder / "bridge")),
+        *("--encode", "h264"),  # raw pictures do not fit every path
     ]
     dials = way != "reached"
     if dials:
@@ -162,8 +163,6 @@ async def _driven(place: _Place, way: Way) -> AsyncIterator[None]:
         robot += ["--console-key-file", str(key)]
     else:
         robot += ["--host", ROBOT_ADDRESS, "--port", str(ROBOT_PORT), "--link-secret-file", str(key)]
-    if way == "behind-nat":
-        robot += ["--encode", "h264"]  # raw pictures do not fit such a path
     address = "dial-in" if dials else f"tcp://{ROBOT_ADDRESS}:{ROBOT_PORT}"
     console = [
         *(LOCKSTEP, "serve", "--json", "--quiet", "--robot", address, "--link-secret-file", str(key)),

@@ -145,6 +145,23 @@ def test_an_index_cannot_hide_an_episode(tmp_path: Path, part: str) -> None:
     assert why == "its recording was made by episodes, as a.mcap says"
 
 
+def test_a_file_that_is_broken_before_its_end_is_not_whole(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    writer = RecordingWriter(path, msgspec.structs.replace(INFO, episodes="none"), DESCRIPTION, CODECS)
+    for entry in sorted([*Story(events=60, real=False).entries(), *KEPT_AND_NOT[:2]], key=lambda each: each.arrived):
+        writer.write(entry)
+        writer.flush()
+    index = writer._builder.index
+    index.counts.clear()
+    index.episodes.clear()
+    writer.close("no_episodes")
+    with path.open("r+b") as file:
+        file.seek(index.chunks[1].offset)
+        file.write(b"\x7f")  # no opcode of a record that readers know
+    (why,) = whole_recordings([path], wanted=False).values()
+    assert why == "it cannot be read"
+
+
 def of_earlier_version(path: Path) -> None:
     info = RecordingInfo(recording="old", epoch=EPOCH)
     assert {"episodes", "cut"}.isdisjoint(info.metadata())  # else its signature would no longer fit

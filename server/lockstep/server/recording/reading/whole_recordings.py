@@ -119,10 +119,12 @@ def _with_records(said: EpisodeUse) -> EpisodeUse | None:
     if said.by_episodes:
         return said
     try:
-        with RecordingReader(said.path, EventIndex()) as reader:
-            info = reader.info
+        with RecordingReader(said.path) as reader:
+            info, indexed = reader.info, {chunk.offset for chunk in reader.index.chunks}
         # Nothing checks an index, of what is where nor of how many: only the records themselves count.
-        found = scan_file(said.path, info).index
-        return said._replace(has_records=bool(found.counts.get(EPISODE)))
+        scan = scan_file(said.path, info)
+        if not indexed <= {chunk.chunk_start_offset for chunk in scan.chunks}:
+            return None  # it is broken before its end, and what follows is not known
+        return said._replace(has_records=bool(scan.index.counts.get(EPISODE)))
     except (RecordingError, OSError):
         return None

@@ -1,5 +1,6 @@
 """The triangles of a mesh that a URDF names, and what is not read."""
 
+import io
 import math
 import os
 import struct
@@ -97,15 +98,48 @@ def test_the_nodes_of_a_scene_are_where_it_places_them(tmp_path: Path) -> None:
     assert sorted(round(x, 6) for x, _, _ in mesh.vertices) == [1.0, 1.0, 3.0]
 
 
-def test_a_mesh_cannot_define_entities_nor_come_in_an_archive(tmp_path: Path) -> None:
-    body = collada().partition(b"?>")[2]
-    entities = b'<!DOCTYPE c [<!ENTITY a "' + b"x" * 1000 + b'">'
-    entities += b"".join(b'<!ENTITY %c "%s">' % (97 + i, b"&%c;" % (96 + i) * 100) for i in range(1, 6)) + b"]>"
-    (tmp_path / "bomb.dae").write_bytes(entities + body.replace(b"<asset>", b"<asset><title>&f;</title>"))
-    with zipfile.ZipFile(tmp_path / "packed.dae", "w") as archive:
+def packed() -> bytes:
+    room = io.BytesIO()
+    with zipfile.ZipFile(room, "w") as archive:
         archive.writestr("link.dae", collada())
-    for name in ("bomb.dae", "packed.dae"):
-        assert read_mesh(f"file://{tmp_path}/{name}", 8) is None
+    return room.getvalue()
+
+
+def doubled(levels: int) -> bytes:
+    """Each node of a library has the one before twice."""
+    nodes = '<node id="n0"><instance_geometry url="#g"/></node>'
+    for level in range(1, levels + 1):
+        nodes += f'<node id="n{level}">' + f'<instance_node url="#n{level - 1}"/>' * 2 + "</node>"
+    text = (
+        collada()
+        .decode()
+        .replace("<library_visual_scenes>", f"<library_nodes>{nodes}</library_nodes><library_visual_scenes>")
+    )
+    return text.replace('<node id="n">', f'<node id="n"><instance_node url="#n{levels}"/>').encode()
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        packed(),
+        b"<" + packed(),
+        collada().replace(b"<COLLADA", b'<!DOCTYPE c [<!ENTITY a SYSTEM "file:///etc/hostname">]><COLLADA'),
+        collada().replace(b"<COLLADA", b"<!DOCTYPE c><COLLADA"),
+        collada().replace(b"<asset>", b'<asset><Name_array id="x" count="1">a</Name_array>'),
+        collada().replace(b"<asset>", b"<asset>" + b'<instance_node url="#n"/>' * 501),
+        doubled(20),
+    ],
+)
+def test_a_mesh_cannot_open_other_files_nor_grow_as_it_is_read(data: bytes, tmp_path: Path) -> None:
+    file = tmp_path / "link.dae"
+    file.write_bytes(data)
+    assert read_mesh(f"file://{file}", 8) is None
+
+
+def test_instances_of_nodes_are_drawn(tmp_path: Path) -> None:
+    file = tmp_path / "link.dae"
+    file.write_bytes(doubled(3))
+    assert read_mesh(f"file://{file}", 8) is not None
 
 
 def ball(rings: int) -> list[list[float]]:
@@ -167,7 +201,11 @@ def test_a_mesh_of_a_package_is_looked_for_where_packages_are(tmp_path: Path) ->
         *(("stl", data) for data in (b"", b"no mesh", binary()[:-1], binary(((float("nan"),) * 3,) * 3))),
         ("stl", b"solid\nvertex a b c\n"),
         *(("obj", data) for data in (b"", b"no mesh", b"v 1 2\nf 1 1 1\n", b"f\n", b"\xff\xfe")),
-        *(("obj", b"v 0 0 0\nf " + face) for face in (b"1 2 3\n", b"-9 1 1\n", b"a b c\n")),
+        *(
+            ("obj", b"v 0 0 0\nf " + face)
+            for face in (b"1 2 3\n", b"-9 1 1\n", b"a b c\n", b"1 1 99999999999999999999\n")
+        ),
+        *((kind, b" " * (1 << 17)) for kind in ("obj", "stl")),
         *(("dae", data) for data in (b"", b"<a/>", collada()[:-20], collada().replace(b"0 1 2", b"0 1 9"))),
     ],
 )

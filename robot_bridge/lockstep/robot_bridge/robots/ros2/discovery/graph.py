@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import JOINT_STATE
 from lockstep.robot_bridge.robots.ros2.discovery.pose import Pose
 from lockstep.robot_bridge.robots.ros2.pinhole import Pinhole
 
@@ -39,6 +40,11 @@ class Topic(NamedTuple):
 
     def kinds(self) -> list[str]:
         return sorted({each.kind for each in (*self.publishers, *self.subscribers)})
+
+    @property
+    def leaf(self) -> str:
+        """The last part of the name: "cmd_vel"."""
+        return self.name.rpartition("/")[2]
 
     def publishes(self, kind: str) -> bool:
         return any(each.kind == kind for each in self.publishers)
@@ -107,6 +113,12 @@ class Graph:
     def taken(self, kind: str) -> list[Topic]:
         """Return the topics whose subscribers take messages of a kind."""
         return [topic for topic in self.topics.values() if topic.takes(kind)]
+
+    def joint_commands(self) -> list[Topic]:
+        """Return the topics on which joint states are taken as commands: nobody says there what the joints are."""
+        return [
+            topic for topic in self.taken(JOINT_STATE) if not topic.publishers and "state" not in topic.leaf.lower()
+        ]
 
     def said(self, topic: str) -> Heard:
         """Return what the topic's messages said; empty for a topic that was silent."""

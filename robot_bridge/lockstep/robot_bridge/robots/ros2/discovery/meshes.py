@@ -7,12 +7,14 @@ all, no file that it names is opened, and nothing of it is kept but the numbers 
 import io
 import os
 import warnings
+import zipfile
 from array import array
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
+from xml.parsers import expat
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +24,9 @@ from lockstep.robot_bridge.robots.ros2.discovery.urdf import Mesh
 __all__ = ["MeshReader", "mesh_file", "read_mesh", "simplified"]
 
 MAX_BYTES = {".stl": 64 << 20, ".dae": 16 << 20, ".obj": 64 << 20}  # of a file
-MOST_CORNERS = 4_000_000  # that an OBJ file's faces may have
+MOST_CORNERS = 4_000_000  # of the triangles of an OBJ or COLLADA file
+MOST_INSTANCES, MOST_NODES = 500, 10_000  # of a COLLADA file; the latter with all that its instances repeat
+MOST_LINE = 1 << 16  # bytes
 MAX_ALL_BYTES = 512 << 20  # of all meshes of a URDF
 MOST_EXTENT = 1e6  # in the mesh's units
 HEAD, TRIANGLE = 84, 50  # bytes of a binary STL: head with the count, each triangle
@@ -99,7 +103,7 @@ def read_mesh(uri: str, most: int) -> Mesh | None:
         if file is None or file.stat().st_size > _most_bytes(file):
             return None
         points = READERS[file.suffix.lower()](file.read_bytes())
-    except (OSError, ValueError):
+    except (OSError, ValueError, OverflowError):
         return None
     if points.size == 0 or len(points) % 3 or not np.isfinite(points).all():
         return None
@@ -175,9 +179,16 @@ def _stl(data: bytes) -> Points:
     return np.fromiter(_text_coordinates(data), np.float64).reshape(-1, 3)
 
 
+def _lines(data: bytes) -> Iterator[list[bytes]]:
+    """Yield the words of each line, one by one: a list of all would be many times as large as the file."""
+    for line in io.BytesIO(data):
+        if len(line) > MOST_LINE:
+            raise ValueError("too long a line")
+        yield line.split()
+
+
 def _text_coordinates(data: bytes) -> Iterator[float]:
-    for line in io.BytesIO(data):  # one by one: a list of all would be many times as large as the file
-        words = line.split()
+    for words in _lines(data):
         if words[:1] == [b"vertex"]:
             x, y, z = map(float, words[1:4])
             yield from (x, y, z)
@@ -190,8 +201,7 @@ def _obj(data: bytes) -> Points:
         ValueError: the data is no OBJ, or has too many faces.
     """
     places, corners = array("d"), array("q")
-    for line in io.BytesIO(data):
-        words = line.split()
+    for words in _lines(data):
         if words[:1] == [b"v"]:
             x, y, z = map(float, words[1:4])
             places.extend((x, y, z))
@@ -220,16 +230,63 @@ def _dae(data: bytes) -> Points:
     """
     import collada
 
-    if not data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
-        raise ValueError("no XML")  # pycollada would unpack an archive
+    _check_collada(data)
     try:
         with warnings.catch_warnings(action="ignore"):  # it uses numpy's matrices, which numpy is going to drop
             document = collada.Collada(io.BytesIO(data), ignore=[collada.common.DaeError])
             unit = document.assetInfo.unitmeter or 1.0
-            found = [_triangles(part) for each in document.scene.objects("geometry") for part in each.primitives()]
+            known: dict[int, int] = {}
+            if sum(_size(node, known) for node in document.scene.nodes) > MOST_NODES:
+                raise ValueError("too many nodes")
+            found, left = [], MOST_CORNERS
+            for each in document.scene.objects("geometry"):
+                for part in each.primitives():
+                    found.append(_triangles(part))
+                    left -= len(found[-1])
+                    if left < 0:
+                        raise ValueError("too many triangles")
     except Exception as error:  # pycollada tells malformed data by errors of many kinds
         raise ValueError("no COLLADA") from error
     return np.concatenate([np.empty((0, 3)), *found]) * unit
+
+
+def _check_collada(data: bytes) -> None:
+    """Refuse what makes a reader open other files, or work without end, before one reads it.
+
+    Raises:
+        ValueError: it is an archive or no XML, defines entities, or has too many instances of nodes.
+    """
+    if zipfile.is_zipfile(io.BytesIO(data)):
+        raise ValueError("an archive")  # which pycollada would unpack
+    instances = 0
+
+    def begin(name: str, _: dict[str, str]) -> None:
+        nonlocal instances
+        kind = name.rpartition(":")[2]
+        instances += kind == "instance_node"
+        # Texts of an array all take as much room as its longest.
+        if instances > MOST_INSTANCES or kind in ("Name_array", "IDREF_array"):
+            raise ValueError(f"too many of {kind}")
+
+    def refuse(*_: object) -> None:
+        raise ValueError("a document type")
+
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = begin
+    parser.StartDoctypeDeclHandler = refuse
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise ValueError("no XML") from error
+
+
+def _size(node: Any, known: dict[int, int]) -> int:
+    """Return how many nodes and geometries stand below a node, and itself; an instance counts as what it names."""
+    meant = getattr(node, "node", node)
+    if id(meant) not in known:
+        known[id(meant)] = 0  # while it is counted: one that contains itself ends there
+        known[id(meant)] = 1 + sum(_size(child, known) for child in getattr(meant, "children", ()))
+    return known[id(meant)]
 
 
 def _triangles(part: Any) -> Points:

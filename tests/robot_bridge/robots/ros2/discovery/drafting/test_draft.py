@@ -216,6 +216,34 @@ def test_velocities_in_an_order_that_is_not_known_are_not_sent() -> None:
         draft(arm_graph("/arm_velocity_controller/commands", FLOATS), TakeGuesses(), None)
 
 
+def test_an_arm_that_takes_joint_states_as_commands_is_found_and_marked(tmp_path: Path) -> None:
+    drafted = draft(arm_graph("/joint_command", JOINT_STATE), TakeGuesses(), None)
+    settings = read(tmp_path, drafted.text)
+    assert settings.arm is not None
+    assert (settings.arm.command.topic, settings.arm.command.message) == ("/joint_command", "JointState")
+    assert [joint.name for joint in settings.arm.joints] == ["elbow", "wrist"]
+    (line,) = (line for line in drafted.text.splitlines() if "topic: /joint_command" in line)
+    assert "CHECK" in line
+
+
+def test_what_listens_to_the_states_of_joints_is_no_arm() -> None:
+    listeners = topics(
+        published("/joint_states", JOINT_STATE),
+        taken("/joint_states", JOINT_STATE, "/robot_state_publisher"),
+        taken("/joint_states_filtered", JOINT_STATE, "/plotter"),
+    )
+    with pytest.raises(NothingToDrive, match="JointState of commands"):
+        draft(Graph(listeners), TakeGuesses(), None)
+
+
+def test_a_trajectory_is_likelier_than_a_joint_state(tmp_path: Path) -> None:
+    arm = arm_graph("/arm_controller/joint_trajectory", TRAJECTORY, joints=["elbow"])
+    graph = replace(arm, topics={**arm.topics, **topics(taken("/joint_command", JOINT_STATE, "/simulator"))})
+    settings = read(tmp_path, draft(graph, TakeGuesses(), None).text)
+    assert settings.arm is not None
+    assert settings.arm.command.message == "JointTrajectory"
+
+
 def test_servo_is_driven_where_it_is_all_there_is(tmp_path: Path) -> None:
     graph = Graph(
         topics(

@@ -20,6 +20,7 @@ def robots(graph: Graph) -> list[str]:
     """Return the namespaces of the robots: each has commands and a state of its own. Empty: the graph is one robot."""
     states = {_top(topic) for kind in (ODOMETRY, JOINT_STATE) for topic in graph.published(kind)}
     commands = {_top(topic) for kind in COMMANDS for topic in graph.taken(kind)}
+    commands |= {_top(topic) for topic in graph.joint_commands()}
     found = sorted(states & commands - {""})
     return [f"/{name}" for name in found] if len(found) > 1 else []
 

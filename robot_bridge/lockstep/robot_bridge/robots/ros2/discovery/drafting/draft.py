@@ -161,7 +161,8 @@ def _urdf(graph: Graph) -> tuple[Urdf | None, list[str]]:
 def _nothing(graph: Graph, namespace: str, remarks: Sequence[str]) -> str:
     where = "" if namespace == "/" else f" below {namespace}"
     seen = ", ".join(sorted(graph.topics)[:12]) or "nothing"
-    why = "; ".join(remarks) or "no node subscribes to Twist, TwistStamped, JointTrajectory or velocities of joints"
+    kinds = "Twist, TwistStamped, JointTrajectory, velocities of joints or a JointState of commands"
+    why = "; ".join(remarks) or f"no node subscribes to {kinds}"
     return f"there is nothing to drive{where}: {why}. Seen: {seen}"
 
 

@@ -17,6 +17,11 @@ TURNING, SLIDING = 0.3, 0.05  # rad/s and m/s, where the robot's own limit is no
 FASTEST = 20.0
 MARGIN, MARGIN_SHARE = 0.05, 0.05  # rad or m kept from a joint's limits, at most this share of its range
 MAX_JOINTS = 64
+MESSAGES = {  # of commands, the likeliest first, with what they say
+    TRAJECTORY: "",
+    FLOATS: "velocities, in the order of `joints`",
+    JOINT_STATE: "positions and velocities; nothing tells that its taker moves the joints to them",
+}
 _NO_ARM = ("wheel", "gripper", "finger", "caster")  # in names of joints that an arm's controller seldom moves
 
 
@@ -30,7 +35,8 @@ def draft_arm(graph: Graph, ask: Ask, urdf: Urdf | None) -> tuple[dict[str, Sect
     """Return the section `arm` or `servo`, nothing without an arm, and remarks for the person."""
     takers = graph.taken(TRAJECTORY)
     takers += [topic for topic in graph.taken(FLOATS) if _takes_velocities(graph, topic) and topic not in takers]
-    takers += [topic for topic in graph.taken(TWIST_STAMPED) if topic.name.endswith(f"/{SERVO_LEAF}")]
+    takers += [topic for topic in graph.taken(TWIST_STAMPED) if topic.leaf == SERVO_LEAF]
+    takers += graph.joint_commands()
     command = choose_topic("Which topic drives the arm?", takers, ask, _rank)
     if command is None:
         return {}, []
@@ -60,14 +66,15 @@ def _section(
     states: tuple[Topic, list[str]],
 ) -> Section:
     topic, other = command
-    is_trajectory = topic.takes(TRAJECTORY)
-    kind = TRAJECTORY if is_trajectory else FLOATS
+    kind = next(kind for kind in MESSAGES if topic.takes(kind))
     node = next(each.node for each in topic.subscribers if each.kind == kind)
     section = Section()
     section.values["command"] = Section(
         values={
-            "topic": Value(topic.name, f"taken by {node}{others(other)}", bool(other) and not ask.answers),
-            "message": Value(kind.rpartition("/")[2], "" if is_trajectory else "velocities, in the order of `joints`"),
+            "topic": Value(
+                topic.name, f"taken by {node}{others(other)}", kind == JOINT_STATE or (bool(other) and not ask.answers)
+            ),
+            "message": Value(kind.rpartition("/")[2], MESSAGES[kind]),
         }
     )
     section.values["states"] = states_section(graph, states)
@@ -122,7 +129,7 @@ def _takes_velocities(graph: Graph, topic: Topic) -> bool:
 
 
 def _rank(topic: Topic) -> tuple[object, ...]:
-    return (topic.takes(TWIST_STAMPED), not topic.takes(TRAJECTORY), _is_gripper(topic))
+    return (topic.takes(JOINT_STATE), topic.takes(TWIST_STAMPED), not topic.takes(TRAJECTORY), _is_gripper(topic))
 
 
 def _is_gripper(topic: Topic) -> bool:
