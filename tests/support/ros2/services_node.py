@@ -1,6 +1,6 @@
 """The robot of robot_node.py with services, batteries and diagnostics. Run with ROS' Python.
 
-More lines on standard input: `charge X` (NaN: unknown) and `level NAME N` (of a component).
+More lines on standard input: `charge X` (NaN: unknown), `level NAME N` (of a component), `press` (its hardware stop).
 """
 
 from pathlib import Path
@@ -9,6 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.callback_groups import ReentrantCallbackGroup
 from robot_node import RobotNode, main  # type: ignore[import-not-found]  # beside this file, which is run as a script
 from sensor_msgs.msg import BatteryState
+from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, Trigger
 
 EVERY = 0.1  # s
@@ -20,6 +21,9 @@ class ServingRobot(RobotNode):  # type: ignore[misc]
         self._charge, self._levels = 0.8, {"motors: left": 0, "lidar": 0}
         self._battery = self.create_publisher(BatteryState, "/battery_state", 10)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._modes = self.create_publisher(String, "/mode", 10)
+        self._stops = self.create_publisher(Bool, "/emergency_stop", 10)
+        self._pressed = False
         group = ReentrantCallbackGroup()
         self.create_service(SetBool, "/light", self._light, callback_group=group)
         self.create_service(Trigger, "/beep", self._beep, callback_group=group)
@@ -30,6 +34,8 @@ class ServingRobot(RobotNode):  # type: ignore[misc]
         verb, *words = line.split(" ")
         if verb == "charge":
             self._charge = float(words[0])
+        elif verb == "press":
+            self._pressed = True
         elif verb == "level":
             self._levels[" ".join(words[:-1])] = int(words[-1])
         else:
@@ -50,6 +56,8 @@ class ServingRobot(RobotNode):  # type: ignore[misc]
         return response
 
     def _report(self) -> None:
+        self._modes.publish(String(data="AUTO"))
+        self._stops.publish(Bool(data=self._pressed))
         battery = BatteryState()
         battery.header.stamp = self.get_clock().now().to_msg()
         battery.voltage, battery.percentage = 24.5, self._charge

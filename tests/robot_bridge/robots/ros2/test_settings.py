@@ -137,6 +137,9 @@ def test_services_become_actions_that_move_nothing(tmp_path: Path) -> None:
     ("text", "complaint"),
     [
         ("batteries:\n  - {topic: /a}\n  - {topic: /b}\n", "batteries[1].name: 'battery' is the name of another"),
+        ("readings:\n  - {topic: /a, name: m}\n  - {topic: /b, name: m}\n", "readings[1].name: 'm' is the name of"),
+        ("readings:\n  - {topic: /a, name: m, kind: switch}\n", "readings[0].kind: a String is no switch"),
+        ("readings:\n  - {topic: /a, name: m, warning: 3}\n", "readings[0]: a mode has no unit and no limits"),
         ("services:\n  - {name: x, service: /x, type: Empty}\n", "services[0].type"),
         ("services:\n  - {name: x, service: /x}\n  - {name: x, service: /y}\n", "name is empty or used twice"),
         ("diagnostics: {most: 41}\n", "diagnostics.most"),

@@ -34,6 +34,7 @@ from lockstep.robot_bridge.robots.ros2.settings import (
     RosAction,
     Service,
     Servo,
+    kind_of_reading,
 )
 from lockstep.robot_bridge.yaml_file import SettingsPlace
 
@@ -69,6 +70,7 @@ def describe(settings: Ros2Settings) -> RobotDescription:
     for number, name in enumerate(names):
         if name in names[:number]:
             raise SettingsPlace(("batteries", number, "name"), f"{name!r} is the name of another battery")
+    _check_readings(settings, names)
     base_axes = () if base is None else _base_axes(base, settings.hold)
     bodies = (() if base is None else (_base_body(base),)) + settings.bodies
     arm_axes = () if arm is None else joint_axes(arm, settings.hold)
@@ -282,6 +284,23 @@ def _planar_base(base: Base) -> PlanarBase:
         margin=base.margin,
         latency=base.latency,
     )
+
+
+READS = {"String": ("mode", "text"), "Bool": ("switch",), "Temperature": ("temperature", "number")}
+NUMBERS = ("number", "temperature")
+
+
+def _check_readings(settings: Ros2Settings, names: list[str]) -> None:
+    """Raises SettingsPlace: a reading has the name of another item, or a kind or a limit that it cannot have."""
+    for number, reading in enumerate(settings.readings):
+        place = ("readings", number)
+        if reading.name in (*names, *(each.name for each in settings.readings[:number]), "hardware_stop"):
+            raise SettingsPlace((*place, "name"), f"{reading.name!r} is the name of another item of the status")
+        kind = kind_of_reading(reading)
+        if kind not in READS.get(reading.message, NUMBERS):
+            raise SettingsPlace((*place, "kind"), f"a {reading.message} is no {kind}")
+        if kind not in NUMBERS and (reading.warning is not None or reading.error is not None or reading.unit):
+            raise SettingsPlace(place, f"a {kind} has no unit and no limits")
 
 
 def _base_body(base: Base) -> Body:

@@ -27,6 +27,7 @@ from lockstep.robot_bridge.robots.ros2.sensing.battery import BatteryTopic
 from lockstep.robot_bridge.robots.ros2.sensing.camera import CameraSource
 from lockstep.robot_bridge.robots.ros2.sensing.camera_info import CameraInfoTopic
 from lockstep.robot_bridge.robots.ros2.sensing.diagnostics import DiagnosticsTopic
+from lockstep.robot_bridge.robots.ros2.sensing.reading import ReadingTopic
 from lockstep.robot_bridge.robots.ros2.sensing.sensors import LockoutTopic, RangeSensor, WrenchTopic
 from lockstep.robot_bridge.robots.ros2.settings import Arm, Ros2Settings
 
@@ -76,6 +77,7 @@ class Ros2Robot(Robot):
             self._batteries = [BatteryTopic(self._ros, battery) for battery in settings.batteries]
             diagnostics = settings.diagnostics
             self._diagnostics = None if diagnostics is None else DiagnosticsTopic(self._ros, diagnostics)
+            self._readings = [ReadingTopic(self._ros, reading) for reading in settings.readings]
             self._cameras = [CameraSource(self._ros, camera) for camera in settings.cameras]
             self._infos = [
                 CameraInfoTopic(self._ros, camera, camera.calibration, camera.info)
@@ -135,6 +137,9 @@ class Ros2Robot(Robot):
     def locked_out(self) -> str:
         return "" if self._lockout is None else self._lockout.reason(clock.now())
 
+    def hardware_stop(self) -> bool | None:
+        return None if self._lockout is None else self._lockout.pressed(clock.now())
+
     def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
         if (goals := self._poses.get(name)) is not None:
             axes, tick = self._description.axes, self.tick_seconds
@@ -144,6 +149,7 @@ class Ros2Robot(Robot):
     def status(self) -> Sequence[StatusItem]:
         now = clock.now()
         items = [item for battery in self._batteries for item in battery.items(now)]
+        items += [item for reading in self._readings for item in reading.items(now)]
         items += [item for info in self._infos for item in info.items()]
         return items + ([] if self._diagnostics is None else self._diagnostics.items(now))
 

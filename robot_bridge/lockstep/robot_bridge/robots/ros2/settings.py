@@ -16,6 +16,8 @@ __all__ = [
     "Battery",
     "CameraTopic",
     "Diagnostics",
+    "Reading",
+    "kind_of_reading",
     "Gripper",
     "JointStates",
     "MapGoal",
@@ -223,6 +225,31 @@ class Diagnostics(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     most: Annotated[int, Meta(ge=1, le=40)] = 12  # components that are shown at once, the worst first
 
 
+ReadingKind = Literal["mode", "text", "switch", "number", "temperature"]
+
+
+class Reading(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A topic with one value, shown in the robot's status: the `data` of std_msgs, or a sensor_msgs/Temperature."""
+
+    topic: Topic
+    name: Name
+    message: Literal["String", "Bool", "Float32", "Float64", "Int32", "Temperature"] = "String"
+    kind: ReadingKind | Literal[""] = ""  # "": by the message, a String is a mode
+    label: str = ""  # "": the name
+    unit: Annotated[str, Meta(max_length=16)] = ""  # of a number; "" for a temperature: °C
+    timeout: Annotated[float, Meta(gt=0, le=600)] = 10.0  # s; then the console marks the reading as old
+    warning: float | None = None  # above it the level is a warning; of a number or a temperature
+    error: float | None = None  # above it an error
+
+
+def kind_of_reading(reading: Reading) -> ReadingKind:
+    """Return what a reading is shown as."""
+    if reading.kind:
+        return reading.kind
+    by_message: dict[str, ReadingKind] = {"String": "mode", "Bool": "switch", "Temperature": "temperature"}
+    return by_message.get(reading.message, "number")
+
+
 class Service(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A service that becomes an action of the robot. It must move nothing: see docs/ros2.md."""
 
@@ -317,6 +344,7 @@ class Lockout(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     topic: Topic
     timeout: Timeout = 1.0
+    hardware_stop: bool = False  # it is a hardware stop of the robot, and the status shows whether it is pressed
 
 
 class Ros2Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -338,6 +366,7 @@ class Ros2Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     lockout: Lockout | None = None
     batteries: Annotated[tuple[Battery, ...], Meta(max_length=8)] = ()
     diagnostics: Diagnostics | None = None
+    readings: Annotated[tuple[Reading, ...], Meta(max_length=16)] = ()
     services: Annotated[tuple[Service, ...], Meta(max_length=32)] = ()
     actions: Annotated[tuple[RosAction, ...], Meta(max_length=32)] = ()
     grippers: Annotated[tuple[Gripper, ...], Meta(max_length=4)] = ()

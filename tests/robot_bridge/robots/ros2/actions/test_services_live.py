@@ -34,6 +34,9 @@ services:
 batteries:
   - {topic: /battery_state}
 diagnostics: {most: 4}
+readings:
+  - {topic: /mode, name: mode, label: Mode}
+lockout: {topic: /emergency_stop, hardware_stop: true}
 """
 
 
@@ -103,11 +106,11 @@ async def test_a_service_that_says_no_has_failed_and_one_that_nobody_offers_is_n
 
 
 async def test_the_battery_and_the_components_are_the_status(operator: Operator, node: RosRobot) -> None:
-    well = await status_of(operator, lambda items: len(items) >= 3)
+    well = await status_of(operator, lambda items: len(items) >= 5)
     battery = well["battery"]
     assert (battery.kind, battery.level) == ("battery", "ok")
     assert battery.value == pytest.approx(0.8)
-    assert [name for name in well if name != "battery"] == ["diagnostics/lidar", "diagnostics/motors: left"]
+    assert [name for name in well if name.startswith("diag")] == ["diagnostics/lidar", "diagnostics/motors: left"]
     await node.tell("level motors: left 2")
     await node.tell("charge 0.1")
     hot = await status_of(
@@ -117,7 +120,21 @@ async def test_the_battery_and_the_components_are_the_status(operator: Operator,
     assert hot["battery"].text == "charge it soon"
     worst = hot["diagnostics/motors: left"]
     assert (worst.level, worst.value, worst.text) == ("error", "too hot", "too hot")
-    assert list(hot)[1] == worst.name, "the worst comes first"
+    assert next(name for name in hot if name.startswith("diag")) == worst.name, "the worst comes first"
     await node.tell("charge nan")
     volts = await status_of(operator, lambda items: items["battery"].kind == "number")
     assert (volts["battery"].value, volts["battery"].unit) == (24.5, "V")
+
+
+async def test_the_mode_and_the_hardware_stop_are_the_status_and_a_pressed_one_stops_the_robot(
+    operator: Operator, node: RosRobot
+) -> None:
+    well = await status_of(operator, lambda items: "mode" in items and "hardware_stop" in items)
+    assert (well["mode"].kind, well["mode"].value, well["mode"].label) == ("mode", "AUTO", "Mode")
+    assert (well["hardware_stop"].value, well["hardware_stop"].level) == (False, "ok")
+    await node.tell("press")
+    pressed = await status_of(operator, lambda items: items["hardware_stop"].value is True)
+    assert pressed["hardware_stop"].level == "error"
+    async with asyncio.timeout(PATIENCE):
+        while not (await operator.next(Feedback)).stop.stopped:
+            pass

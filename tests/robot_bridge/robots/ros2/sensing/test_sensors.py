@@ -26,9 +26,9 @@ class OneTopic:
         self.take(SimpleNamespace(data=locked))
 
 
-def lockout() -> tuple[OneTopic, LockoutTopic]:
+def lockout(*, hardware_stop: bool = False) -> tuple[OneTopic, LockoutTopic]:
     ros = OneTopic()
-    return ros, LockoutTopic(cast(RosSide, ros), Lockout(topic=TOPIC, timeout=1.0))
+    return ros, LockoutTopic(cast(RosSide, ros), Lockout(topic=TOPIC, hardware_stop=hardware_stop, timeout=1.0))
 
 
 def test_before_the_first_word_of_the_lockout_topic_the_robot_is_locked() -> None:
@@ -50,3 +50,16 @@ def test_a_lockout_topic_that_falls_silent_locks() -> None:
     ros.says(locked=False)
     assert topic.reason(clock.now()) == ""
     assert topic.reason(clock.now() + 1.1) == f"no message of the lock-out topic arrives ({TOPIC})"
+
+
+def test_a_lockout_that_is_a_hardware_stop_says_whether_it_is_pressed_while_it_is_heard() -> None:
+    ros, topic = lockout(hardware_stop=True)
+    assert topic.pressed(clock.now()) is None
+    ros.says(locked=True)
+    assert topic.pressed(clock.now()) is True
+    ros.says(locked=False)
+    assert topic.pressed(clock.now()) is False
+    assert topic.pressed(clock.now() + 1.1) is None
+    ros, topic = lockout()
+    ros.says(locked=True)
+    assert topic.pressed(clock.now()) is None, "a key switch is no hardware stop"

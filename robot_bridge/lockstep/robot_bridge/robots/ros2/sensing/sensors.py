@@ -83,6 +83,7 @@ class LockoutTopic:
 
     def __init__(self, ros: RosSide, settings: Lockout) -> None:
         self._topic = settings.topic
+        self._is_hardware_stop = settings.hardware_stop
         self._said: Newest[bool] = Newest(settings.topic, settings.timeout)
         self._heard = threading.Event()
         ros.subscribe(ros.interface("std_msgs/msg/Bool"), settings.topic, self._take)
@@ -97,6 +98,11 @@ class LockoutTopic:
         if said is None:
             return f"no message of the lock-out topic arrives ({self._topic})"
         return f"locked at the robot ({self._topic})" if said.value else ""
+
+    def pressed(self, now: float) -> bool | None:
+        """Return whether the hardware stop is pressed; None if this is none, or nothing says so now."""
+        said = self._said.fresh(now) if self._is_hardware_stop else None
+        return None if said is None else said.value
 
     def _take(self, message: Any) -> None:
         self._said.put(bool(message.data), clock.now())
