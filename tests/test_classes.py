@@ -22,7 +22,7 @@ ALLOWED = {
     f"{ROBOTS}/mjcf/robot.py MjcfRobot": 22,
     f"{ROBOTS}/mobile_manipulator/robot.py MobileManipulator": 21,
     f"{ROBOTS}/planar/robot.py PlanarRobot": 18,
-    f"{ROBOTS}/ros2/robot.py Ros2Robot": 21,
+    f"{ROBOTS}/ros2/robot.py Ros2Robot": 22,
     f"{ROBOTS}/so101/robot.py So101": 21,
     # what server and client call: each method is one of the peer's, with the clock and a flush
     "rtc/lockstep/rtc/sockets/connection.py Connection": 32,
