@@ -2,7 +2,7 @@
 
 import pytest
 
-from lockstep.bench.sections.live_tools import viewer_program
+from lockstep.bench.sections.costs.live_tools import viewer_program
 
 
 def test_the_viewer_is_the_program_itself_and_no_script_that_leaves_it_running() -> None:

@@ -1,7 +1,7 @@
 import pytest
 
 from lockstep.bench.harness.stack import Metrics
-from lockstep.bench.sections.observers import Counts, Missed, Received, counts_from, missed_between
+from lockstep.bench.sections.costs.observers import Counts, Missed, Received, counts_from, missed_between
 
 
 def seen(*pictures: int, lost: int = 0) -> list[Received]:

@@ -10,7 +10,8 @@ from lockstep.bench.context import Context
 from lockstep.bench.harness.driving import console_trips, link_trips
 from lockstep.bench.harness.event_log import robot_times
 from lockstep.bench.harness.stack import running_bridge, running_stack
-from lockstep.bench.sections import command_to_feedback, datagrams, episodes_cost, goals, scene
+from lockstep.bench.sections.costs import datagrams, episodes_cost, scene
+from lockstep.bench.sections.driving import command_to_feedback, goals
 from lockstep.client import Console
 from lockstep.robot_bridge.link.link_client import RobotLink
 from tests.e2e.so101 import SO101, needs_so101
@@ -111,12 +112,13 @@ async def test_a_section_that_fails_is_named_and_the_others_are_measured(monkeyp
         return []
 
     monkeypatch.setattr("lockstep.bench.cli.available_robots", nothing)
-    monkeypatch.setattr("lockstep.bench.sections.lossy.run", fail)
+    monkeypatch.setattr("lockstep.bench.sections.driving.lossy.run", fail)
     measured = await measure(["lossy", "command_to_feedback"], quick=True)
     assert measured.failed == {"lossy": "RuntimeError: no such luck"}
     assert measured.busy_percent.keys() == {"lossy", "command_to_feedback"}
 
 
 def test_every_section_is_listed() -> None:
-    files = {path.stem for path in Path(sections.__file__).parent.glob("*.py")} - {"__init__"}
-    assert set(SECTIONS) == files
+    files = {path.stem: path.parent.name for path in Path(sections.__file__).parent.glob("*/*.py")}
+    del files["__init__"]
+    assert files == SECTIONS

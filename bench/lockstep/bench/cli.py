@@ -20,26 +20,26 @@ from lockstep.bench.harness.stack import available_robots
 
 __all__ = ["SECTIONS", "Measured", "main", "measure"]
 
-SECTIONS = (
-    "command_to_feedback",
-    "goals",
-    "lossy",
-    "gates",
-    "capture_to_shown",
-    "traces",
-    "sound",
-    "first_picture",
-    "start",
-    "observers",
-    "relay",
-    "robot_cost",
-    "scene",
-    "memory",
-    "recording",
-    "episodes_cost",
-    "datagrams",
-    "live_tools",
-)
+SECTIONS = {  # in this order; the folder of each
+    "command_to_feedback": "driving",
+    "goals": "driving",
+    "lossy": "driving",
+    "gates": "driving",
+    "capture_to_shown": "media",
+    "traces": "media",
+    "sound": "media",
+    "first_picture": "media",
+    "start": "costs",
+    "observers": "costs",
+    "relay": "costs",
+    "robot_cost": "costs",
+    "scene": "costs",
+    "memory": "costs",
+    "recording": "costs",
+    "episodes_cost": "costs",
+    "datagrams": "costs",
+    "live_tools": "costs",
+}
 BUSY_PERCENT = 8.0  # of the machine, used by other processes, above which the figures say more about them
 LOOK_SECONDS = 1.5  # of looking at other processes before each section
 
@@ -104,7 +104,7 @@ async def measure(sections: list[str], quick: bool) -> Measured:
         neighbours = f" (others use {busy:.0f} % of this machine: too much)" if busy > BUSY_PERCENT else ""
         _say(f"{name} …{neighbours}")
         try:
-            measured.results += await import_module(f"lockstep.bench.sections.{name}").run(context)
+            measured.results += await import_module(f"lockstep.bench.sections.{SECTIONS[name]}.{name}").run(context)
         except Exception as error:
             measured.failed[name] = _reason(error)
             _say(f"{name} failed: {measured.failed[name]}")

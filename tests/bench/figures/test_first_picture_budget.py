@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from lockstep.bench.sections.first_picture import FAR_PROFILES, budget_ms
+from lockstep.bench.sections.media.first_picture import FAR_PROFILES, budget_ms
 from lockstep.emulator.impairment.profile import load_profile
 from tests.docs.test_performance import HISTORY, RUNS
 

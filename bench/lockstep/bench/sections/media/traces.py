@@ -17,7 +17,7 @@ from lockstep.bench.figures.results import Result
 from lockstep.bench.figures.samples import median
 from lockstep.bench.figures.way_results import sum_of_spans, way_results
 from lockstep.bench.harness.stack import Stack, running_stack
-from lockstep.bench.sections.capture_to_shown import AIORTC, CAMERA, bare_page, driving_in_circles, measured_spell
+from lockstep.bench.sections.media.capture_to_shown import AIORTC, CAMERA, bare_page, driving_in_circles, measured_spell
 from lockstep.protocol.traces.trace import COMMAND_WAY, PICTURE_WAY
 
 __all__ = ["run"]

@@ -1,0 +1,1 @@
+"""What a part costs a process, a machine or the operator."""

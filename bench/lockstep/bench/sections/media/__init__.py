@@ -1,0 +1,1 @@
+"""What pictures and sound take, from the robot to the eye and the ear."""
