@@ -16,6 +16,7 @@ class Openings:
 
     def __init__(self, late: float) -> None:
         self.late = late
+        self.slow: asyncio.Event | None = None  # one that is cancelled ends when this is set
         self.ways: list[asyncio.Future[str]] = []
         self.cancelled = 0
         self.discarded: list[str] = []
@@ -31,6 +32,8 @@ class Openings:
             return await mine
         except asyncio.CancelledError:
             self.cancelled += 1
+            if self.slow is not None:
+                await self.slow.wait()
             raise
 
     async def wait_for(self, begun: int) -> None:
@@ -112,9 +115,14 @@ async def test_one_that_fails_leaves_the_other_to_be_opened_and_the_first_error_
 
 async def test_a_race_that_is_cancelled_begins_no_other() -> None:
     openings = Openings(0.01)
+    openings.slow = asyncio.Event()
     race = openings.race()
     await openings.wait_for(1)
     race.cancel()
+    later = asyncio.Event()
+    asyncio.get_running_loop().call_later(0.05, later.set)  # behind the timer of the other one, were it still there
+    await later.wait()
+    openings.slow.set()
     with pytest.raises(asyncio.CancelledError):
         await race
     assert len(openings.ways) == 1

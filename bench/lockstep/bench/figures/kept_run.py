@@ -11,10 +11,11 @@ from lockstep.bench.figures.machine import machine_facts
 __all__ = ["kept_run"]
 
 
-FILE = "--json"  # where the run is written, which is nobody else's place
+FILE = "--json"  # where the run is written: a path of this machine
 
 
 def _without_file(arguments: Sequence[str]) -> list[str]:
+    arguments = [each for each in arguments if not each.startswith(f"{FILE}=")]
     at = arguments.index(FILE) if FILE in arguments else len(arguments)
     return [*arguments[:at], *arguments[at + 2 :]]
 

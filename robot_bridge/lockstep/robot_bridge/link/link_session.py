@@ -319,7 +319,8 @@ class ClientSession(LinkSession):
         super().tick(now)
         if self.asks_at is not None and now >= self.asks_at:
             self._asking.asked(now)
-            self._outgoing.append(self._heartbeats.ping_early(now))
+            if not any(isinstance(message, Ping) for message in self._outgoing):
+                self._outgoing.append(self._heartbeats.ping_early(now))
 
     def _shake_hands(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
         if isinstance(message, Goodbye):

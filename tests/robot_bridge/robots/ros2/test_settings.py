@@ -22,6 +22,9 @@ arm:
 """
 
 
+HOT = "topic: /a, message: Temperature, name: m"
+
+
 def written(directory: Path, text: str) -> Path:
     path = directory / "robot.yaml"
     path.write_text(text)
@@ -140,6 +143,11 @@ def test_services_become_actions_that_move_nothing(tmp_path: Path) -> None:
         ("readings:\n  - {topic: /a, name: m}\n  - {topic: /b, name: m}\n", "readings[1].name: 'm' is the name of"),
         ("readings:\n  - {topic: /a, name: m, kind: switch}\n", "readings[0].kind: a String is no switch"),
         ("readings:\n  - {topic: /a, name: m, warning: 3}\n", "readings[0]: a mode has no unit and no limits"),
+        ("readings:\n  - {topic: /a, name: encoder_fallback}\n", "readings[0].name: 'encoder_fallback' is the name of"),
+        ("batteries:\n  - {name: hardware_stop}\n", "batteries[0].name: 'hardware_stop' is the name of an item of"),
+        (f"readings:\n  - {{topic: /a, name: m, label: {'l' * 201}}}\n", "readings[0].label"),
+        (f"readings:\n  - {{{HOT}, error: .nan}}\n", "readings[0].error: a limit is a number"),
+        (f"readings:\n  - {{{HOT}, warning: 80, error: 60}}\n", "readings[0].error: it is below the warning"),
         ("services:\n  - {name: x, service: /x, type: Empty}\n", "services[0].type"),
         ("services:\n  - {name: x, service: /x}\n  - {name: x, service: /y}\n", "name is empty or used twice"),
         ("diagnostics: {most: 41}\n", "diagnostics.most"),

@@ -25,6 +25,8 @@ from lockstep.robot_bridge.robots.ros2.controls import arm_layers, base_layer
 from lockstep.robot_bridge.robots.ros2.joint_axes import SLEW_TIME, brake_for, joint_axes
 from lockstep.robot_bridge.robots.ros2.saved_poses import pose_actions
 from lockstep.robot_bridge.robots.ros2.settings import (
+    KINDS,
+    NUMBERS,
     ArmJoint,
     Base,
     BaseAxis,
@@ -49,6 +51,9 @@ SERVO_AXES: Final = ("tool.x", "tool.y", "tool.z", "tool.rz", "tool.rx", "tool.r
 _COLOUR = (0.25, 0.55, 0.85, 1.0)
 
 
+OWN_ITEMS = ("hardware_stop", "encoder_fallback")  # of the status, that the bridge adds itself
+
+
 def describe(settings: Ros2Settings) -> RobotDescription:
     """Return the description of the robot.
 
@@ -70,6 +75,8 @@ def describe(settings: Ros2Settings) -> RobotDescription:
     for number, name in enumerate(names):
         if name in names[:number]:
             raise SettingsPlace(("batteries", number, "name"), f"{name!r} is the name of another battery")
+        if name in OWN_ITEMS:
+            raise SettingsPlace(("batteries", number, "name"), f"{name!r} is the name of an item of the bridge's own")
     _check_readings(settings, names)
     base_axes = () if base is None else _base_axes(base, settings.hold)
     bodies = (() if base is None else (_base_body(base),)) + settings.bodies
@@ -286,21 +293,24 @@ def _planar_base(base: Base) -> PlanarBase:
     )
 
 
-READS = {"String": ("mode", "text"), "Bool": ("switch",), "Temperature": ("temperature", "number")}
-NUMBERS = ("number", "temperature")
-
-
 def _check_readings(settings: Ros2Settings, names: list[str]) -> None:
     """Raises SettingsPlace: a reading has the name of another item, or a kind or a limit that it cannot have."""
+    taken = {*names, *OWN_ITEMS, *(f"calibration_{camera.name}" for camera in settings.cameras)}
     for number, reading in enumerate(settings.readings):
         place = ("readings", number)
-        if reading.name in (*names, *(each.name for each in settings.readings[:number]), "hardware_stop"):
+        if reading.name in (*taken, *(each.name for each in settings.readings[:number])):
             raise SettingsPlace((*place, "name"), f"{reading.name!r} is the name of another item of the status")
         kind = kind_of_reading(reading)
-        if kind not in READS.get(reading.message, NUMBERS):
+        if kind not in KINDS.get(reading.message, NUMBERS):
             raise SettingsPlace((*place, "kind"), f"a {reading.message} is no {kind}")
         if kind not in NUMBERS and (reading.warning is not None or reading.error is not None or reading.unit):
             raise SettingsPlace(place, f"a {kind} has no unit and no limits")
+        warning, error = reading.warning, reading.error
+        for key, bound in (("warning", warning), ("error", error)):
+            if bound is not None and not math.isfinite(bound):
+                raise SettingsPlace((*place, key), "a limit is a number")
+        if warning is not None and error is not None and error < warning:
+            raise SettingsPlace((*place, "error"), "it is below the warning")
 
 
 def _base_body(base: Base) -> Body:

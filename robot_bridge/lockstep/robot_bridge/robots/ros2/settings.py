@@ -37,6 +37,7 @@ __all__ = [
 ]
 
 Name = Annotated[str, Meta(min_length=1, max_length=100)]
+MAX_LABEL = 200  # characters
 Topic = Annotated[str, Meta(pattern=r"^[~/A-Za-z_][A-Za-z0-9_/]*$", max_length=200)]
 InterfaceType = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_]*/(action/)?[A-Z][A-Za-z0-9]*$", max_length=200)]
 FieldPath = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*$", max_length=200)]
@@ -211,7 +212,7 @@ class Battery(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     topic: Topic = "/battery_state"
     name: Name = "battery"
-    label: str = "Battery"
+    label: Annotated[str, Meta(max_length=MAX_LABEL)] = "Battery"
     timeout: Annotated[float, Meta(gt=0, le=600)] = 10.0  # s; then the console marks the reading as old
     low: Annotated[float, Meta(ge=0, le=1)] = 0.2  # below it the level is a warning
     empty: Annotated[float, Meta(ge=0, le=1)] = 0.05  # below it an error
@@ -226,6 +227,12 @@ class Diagnostics(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
 
 ReadingKind = Literal["mode", "text", "switch", "number", "temperature"]
+NUMBERS: tuple[ReadingKind, ...] = ("number", "temperature")
+KINDS: dict[str, tuple[ReadingKind, ...]] = {  # by message, the usual one first; of the others they are numbers
+    "String": ("mode", "text"),
+    "Bool": ("switch",),
+    "Temperature": ("temperature", "number"),
+}
 
 
 class Reading(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -235,7 +242,7 @@ class Reading(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     name: Name
     message: Literal["String", "Bool", "Float32", "Float64", "Int32", "Temperature"] = "String"
     kind: ReadingKind | Literal[""] = ""  # "": by the message, a String is a mode
-    label: str = ""  # "": the name
+    label: Annotated[str, Meta(max_length=MAX_LABEL)] = ""  # "": the name
     unit: Annotated[str, Meta(max_length=16)] = ""  # of a number; "" for a temperature: °C
     timeout: Annotated[float, Meta(gt=0, le=600)] = 10.0  # s; then the console marks the reading as old
     warning: float | None = None  # above it the level is a warning; of a number or a temperature
@@ -244,10 +251,7 @@ class Reading(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 def kind_of_reading(reading: Reading) -> ReadingKind:
     """Return what a reading is shown as."""
-    if reading.kind:
-        return reading.kind
-    by_message: dict[str, ReadingKind] = {"String": "mode", "Bool": "switch", "Temperature": "temperature"}
-    return by_message.get(reading.message, "number")
+    return reading.kind or KINDS.get(reading.message, NUMBERS)[0]
 
 
 class Service(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -10,6 +10,7 @@ Only what lies within the episode's events counts, so that the parts of a split 
 from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import msgspec
 
@@ -18,11 +19,11 @@ from lockstep.protocol.serial import is_newer
 from lockstep.server.recording.format.drivers import EventDriver
 from lockstep.server.recording.format.records import (
     CommandRecord,
-    Count,
     EpisodeRecord,
     FeedbackRecord,
     OwnRecord,
     RefusalRecord,
+    Whole,
 )
 from lockstep.server.recording.format.topics import OWN_TOPICS
 from lockstep.server.recording.reading.command_delays import CommandDelays
@@ -45,8 +46,10 @@ class DriverCommands(msgspec.Struct, frozen=True, kw_only=True):
     kind: DriverKind
     median_ms: float | None = None  # None: no command had a feedback
     p95_ms: float | None = None
-    delays: dict[float, Count] = {}  # number of commands by delay in two digits, 0.1 ms at least; to add up episodes
-    refused: dict[str, Count] = {}  # number of commands that were refused, by reason
+    delays: dict[
+        Annotated[float, msgspec.Meta(ge=0)], Whole
+    ] = {}  # number of commands by delay in two digits, 0.1 ms at least; to add up episodes
+    refused: dict[str, Whole] = {}  # number of commands that were refused, by reason
 
 
 class EpisodeCommands(msgspec.Struct, frozen=True, kw_only=True):
@@ -86,6 +89,7 @@ class CommandTally:
         self._kinds: dict[str, DriverKind] = {}  # by name; a refusal does not tell it
         self._refused: Counter[tuple[str, str]] = Counter()  # by name and reason
         self._refused_last: Counter[tuple[str, str]] = Counter()  # those while the last event held
+        self._refused_names: set[str] = set()
         self._is_over = False
 
     def take(self, record: OwnRecord | None, arrived: int, driver: EventDriver) -> None:
@@ -127,9 +131,10 @@ class CommandTally:
     def _refusal(self, record: RefusalRecord) -> None:
         counts = self._refused_last if record.event == self._last else self._refused
         key = record.name, record.reason
-        is_known = key in self._refused or key in self._refused_last
-        if not is_known and len({name for name, _ in (*self._refused, *self._refused_last)}) >= MAX_DRIVERS:
+        if record.name not in self._refused_names and len(self._refused_names) >= MAX_DRIVERS:
             key = OTHERS, record.reason
+        else:
+            self._refused_names.add(record.name)
         counts[key] += 1
 
     def _bound(self, record: EpisodeRecord) -> None:
@@ -137,6 +142,7 @@ class CommandTally:
         if record.kind == "start" and record.first_event == self._first:
             self._refused.clear()
             self._refused_last.clear()
+            self._refused_names.clear()
         elif record.kind == "kept" and record.last_event == self._last:
             self._is_over = True
             self._refused += self._refused_last

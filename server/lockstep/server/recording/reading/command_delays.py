@@ -23,5 +23,5 @@ class CommandDelays:
                 self._event, self._sent = event, arrived
             case FeedbackRecord(event=event) if event == self._event:
                 self._event = 0
-                return (arrived - self._sent) / 1e6
+                return max(0, arrived - self._sent) / 1e6  # a clock may be set back
         return None

@@ -128,6 +128,14 @@ def doubled(levels: int) -> bytes:
         collada().replace(b"<asset>", b'<asset><Name_array id="x" count="1">a</Name_array>'),
         collada().replace(b"<asset>", b"<asset>" + b'<instance_node url="#n"/>' * 501),
         doubled(20),
+        collada(shape="polylist").replace(b"<vcount>3</vcount>", b"<vcount>2000000000</vcount>"),
+        collada()
+        .replace(b"</node></visual_scene>", b'<instance_geometry url="#g"/>' * 3 + b"</node></visual_scene>")
+        .replace(
+            b"</mesh>",
+            b'<lines count="0"><input semantic="VERTEX" source="#v" offset="0"/><p/></lines>' * 40000 + b"</mesh>",
+        ),
+        doubled(240).replace(b'<instance_geometry url="#g"/></node>', b"<node/>" * 5000 + b"</node>"),
     ],
 )
 def test_a_mesh_cannot_open_other_files_nor_grow_as_it_is_read(data: bytes, tmp_path: Path) -> None:
@@ -205,7 +213,8 @@ def test_a_mesh_of_a_package_is_looked_for_where_packages_are(tmp_path: Path) ->
             ("obj", b"v 0 0 0\nf " + face)
             for face in (b"1 2 3\n", b"-9 1 1\n", b"a b c\n", b"1 1 99999999999999999999\n")
         ),
-        *((kind, b" " * (1 << 17)) for kind in ("obj", "stl")),
+        ("obj", wavefront() + b"v" + b" " * (1 << 17) + b"0 0 0\n"),
+        ("stl", text() + b" " * (1 << 17)),
         *(("dae", data) for data in (b"", b"<a/>", collada()[:-20], collada().replace(b"0 1 2", b"0 1 9"))),
     ],
 )

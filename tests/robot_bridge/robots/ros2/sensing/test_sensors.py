@@ -57,9 +57,11 @@ def test_a_lockout_that_is_a_hardware_stop_says_whether_it_is_pressed_while_it_i
     assert topic.pressed(clock.now()) is None
     ros.says(locked=True)
     assert topic.pressed(clock.now()) is True
+    assert topic.reason(clock.now()) == f"by {TOPIC}", "the robot is locked, and one cause is told once"
     ros.says(locked=False)
     assert topic.pressed(clock.now()) is False
     assert topic.pressed(clock.now() + 1.1) is None
+    assert topic.reason(clock.now() + 1.1) != "", "silence locks all the same"
     ros, topic = lockout()
     ros.says(locked=True)
     assert topic.pressed(clock.now()) is None, "a key switch is no hardware stop"

@@ -26,6 +26,8 @@ __all__ = ["MeshReader", "mesh_file", "read_mesh", "simplified"]
 MAX_BYTES = {".stl": 64 << 20, ".dae": 16 << 20, ".obj": 64 << 20}  # of a file
 MOST_CORNERS = 4_000_000  # of the triangles of an OBJ or COLLADA file
 MOST_INSTANCES, MOST_NODES = 500, 10_000  # of a COLLADA file; the latter with all that its instances repeat
+MOST_WORK = 1_000_000  # elements in a COLLADA file's libraries of nodes, times its instances
+LEAST = 30  # corners that a part of a COLLADA file counts at least, as one of lines, which has none
 MOST_LINE = 1 << 16  # bytes
 MAX_ALL_BYTES = 512 << 20  # of all meshes of a URDF
 MOST_EXTENT = 1e6  # in the mesh's units
@@ -242,7 +244,7 @@ def _dae(data: bytes) -> Points:
             for each in document.scene.objects("geometry"):
                 for part in each.primitives():
                     found.append(_triangles(part))
-                    left -= len(found[-1])
+                    left -= max(LEAST, len(found[-1]))
                     if left < 0:
                         raise ValueError("too many triangles")
     except Exception as error:  # pycollada tells malformed data by errors of many kinds
@@ -258,26 +260,35 @@ def _check_collada(data: bytes) -> None:
     """
     if zipfile.is_zipfile(io.BytesIO(data)):
         raise ValueError("an archive")  # which pycollada would unpack
-    instances = 0
+    instances = elements = depth = 0  # elements in libraries of nodes, and how deep in such a library the parser is
 
     def begin(name: str, _: dict[str, str]) -> None:
-        nonlocal instances
+        nonlocal instances, elements, depth
         kind = name.rpartition(":")[2]
         instances += kind == "instance_node"
+        depth += depth > 0 or kind == "library_nodes"
+        elements += depth > 0
         # Texts of an array all take as much room as its longest.
         if instances > MOST_INSTANCES or kind in ("Name_array", "IDREF_array"):
             raise ValueError(f"too many of {kind}")
+
+    def end(_: str) -> None:
+        nonlocal depth
+        depth -= depth > 0
 
     def refuse(*_: object) -> None:
         raise ValueError("a document type")
 
     parser = expat.ParserCreate()
-    parser.StartElementHandler = begin
+    parser.StartElementHandler, parser.EndElementHandler = begin, end
     parser.StartDoctypeDeclHandler = refuse
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
         raise ValueError("no XML") from error
+    # pycollada tries the nodes of a library again until none is left whose instances it does not know.
+    if elements * (instances + 1) > MOST_WORK:
+        raise ValueError("too many instances in a library")
 
 
 def _size(node: Any, known: dict[int, int]) -> int:
@@ -292,6 +303,9 @@ def _size(node: Any, known: dict[int, int]) -> int:
 def _triangles(part: Any) -> Points:
     """Return the corners of a part of a COLLADA geometry; none of lines."""
     if hasattr(part, "triangleset"):
+        # A number of corners that is not there would take its room all the same.
+        if part.original.nvertices != len(part.original.index):
+            raise ValueError("polygons with other corners than there are")
         part = part.triangleset()
     numbers = part.vertex_index
     if part.vertex is None or numbers is None or np.ndim(numbers) != 2 or np.shape(numbers)[1] != 3:

@@ -97,7 +97,10 @@ class LockoutTopic:
         said = self._said.fresh(now)
         if said is None:
             return f"no message of the lock-out topic arrives ({self._topic})"
-        return f"locked at the robot ({self._topic})" if said.value else ""
+        if not said.value:
+            return ""
+        # Of a hardware stop a person is told already that it is pressed.
+        return f"by {self._topic}" if self._is_hardware_stop else f"locked at the robot ({self._topic})"
 
     def pressed(self, now: float) -> bool | None:
         """Return whether the hardware stop is pressed; None if this is none, or nothing says so now."""
