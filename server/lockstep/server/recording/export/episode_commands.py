@@ -46,9 +46,8 @@ class DriverCommands(msgspec.Struct, frozen=True, kw_only=True):
     kind: DriverKind
     median_ms: float | None = None  # None: no command had a feedback
     p95_ms: float | None = None
-    delays: dict[
-        Annotated[float, msgspec.Meta(ge=0)], Whole
-    ] = {}  # number of commands by delay in two digits, 0.1 ms at least; to add up episodes
+    # The number of commands by their delay in two digits, 0.1 ms at least, to add up episodes.
+    delays: dict[Annotated[float, msgspec.Meta(ge=0)], Whole] = {}
     refused: dict[str, Whole] = {}  # number of commands that were refused, by reason
 
 
