@@ -2,8 +2,14 @@
 
 import json
 import re
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
+import pytest
+
+from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.export.export_lerobot import DatasetOptions, export_all
 from lockstep.server.recording.format.topics import CAMERA
@@ -72,3 +78,41 @@ def test_a_kept_episode_without_a_row_tells_its_refused_commands(tmp_path: Path)
     assert re.search(
         r"without a row .* a push success 20270115-planar-ab12 part 1 1 late 1 ", plain(dataset_page(root))
     )
+
+
+def numbers_in(value: Any, where: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Yield where a number is, or a key of an object that is one."""
+    if isinstance(value, dict | list):
+        for key, each in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from numbers_in(each, (*where, key))
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield where
+
+
+@pytest.mark.parametrize("hostile", [-1, 0, 10**6, 2**53, 2**70, 10**400, -1e308, 0.5], ids=lambda number: str(number)[:20])
+def test_no_number_in_the_notes_of_a_dataset_ends_its_page_in_a_traceback(tmp_path: Path, hostile: float) -> None:
+    (root,) = export_lerobot.export(recorded(tmp_path / "a.mcap"), tmp_path / "dataset", "")
+    file = root / "meta/lockstep.json"
+    kept = file.read_text()
+    places = list(numbers_in(json.loads(kept)))
+    assert {"delays", "refused", "rows", "first_event"} <= {key for where in places for key in where}
+    for where in places:
+        notes = json.loads(kept)
+        within = notes
+        for key in where[:-1]:
+            within = within[key]
+        within[where[-1]] = hostile
+        file.write_text(json.dumps(notes))
+        with suppress(RecordingDamaged, OSError):  # which the command line says in one line
+            checked(dataset_page(root))
+
+
+def test_no_delay_in_the_notes_of_a_dataset_ends_its_page_in_a_traceback(tmp_path: Path) -> None:
+    (root,) = export_lerobot.export(recorded(tmp_path / "a.mcap"), tmp_path / "dataset", "")
+    file = root / "meta/lockstep.json"
+    notes = json.loads(file.read_text())
+    for hostile in ("-1.0", "1e308", "1e400", "NaN", "-Infinity", "", "late"):
+        notes["episodes"][0]["commands"]["drivers"][0]["delays"] = {hostile: 1, "10.0": 2**53 - 1}
+        file.write_text(json.dumps(notes))
+        with suppress(RecordingDamaged):
+            checked(dataset_page(root))
