@@ -89,7 +89,9 @@ def numbers_in(value: Any, where: tuple[Any, ...] = ()) -> Iterator[tuple[Any, .
         yield where
 
 
-@pytest.mark.parametrize("hostile", [-1, 0, 10**6, 2**53, 2**70, 10**400, -1e308, 0.5], ids=lambda number: str(number)[:20])
+@pytest.mark.parametrize(
+    "hostile", [-1, 0, 10**6, 2**53, 2**70, 10**400, -1e308, 0.5], ids=lambda number: str(number)[:20]
+)
 def test_no_number_in_the_notes_of_a_dataset_ends_its_page_in_a_traceback(tmp_path: Path, hostile: float) -> None:
     (root,) = export_lerobot.export(recorded(tmp_path / "a.mcap"), tmp_path / "dataset", "")
     file = root / "meta/lockstep.json"
