@@ -11,7 +11,9 @@ from typing import Annotated, Any
 import typer
 import uvloop
 
-from lockstep.bench.episodes.faults import FAULTS, FaultName, run_fault
+from lockstep.bench.episodes.fault_alone import run_fault
+from lockstep.bench.episodes.faulted_day import record_faulted_day
+from lockstep.bench.episodes.faults import FAULTS, FaultName
 from lockstep.bench.episodes.run import Choices, record_episodes
 from lockstep.bench.harness.processes import ProcessFailed
 from lockstep.client.errors import ConsoleError
@@ -36,27 +38,36 @@ def command(
             help=f"Try this fault instead, without a network; all, or one of {', '.join(FAULTS)}. May repeat."
         ),
     ] = None,
+    among: Annotated[
+        bool, typer.Option("--among-episodes", help="The faults strike among the episodes, through the network.")
+    ] = False,
     seed: Annotated[int, typer.Option(help="Of the network, and of what becomes of which episode.")] = 1,
     pictures: Annotated[bool, typer.Option(help="The drivers receive the pictures of both cameras.")] = True,
     keep: Annotated[Path | None, typer.Option(help="Keep the recordings and the dataset in this folder.")] = None,
     json_to: Annotated[str, typer.Option("--json", help="Write the figures there; - is standard output.")] = "",
 ) -> None:
     """Record episodes, export them, and look at each picture of the dataset; ends with 1 when something is wrong."""
-    faults = _faults(fault or [])
+    faults = _faults(fault or (["all"] if among else []))
+    choices = Choices(network, times, discard, redo, seed, pictures, keep)
     if discard + redo > times:
         raise typer.BadParameter("more episodes are discarded and redone than there are")
     try:
-        if faults:
+        if among:
+            figures: dict[str, Any] = uvloop.run(record_faulted_day(choices, faults, _say))
+        elif faults:
             tried = [uvloop.run(run_fault(each, _say)) for each in faults]
-            figures: dict[str, Any] = {"faults": tried, "ok": all(each["ok"] for each in tried)}
+            figures = {"faults": tried, "ok": all(each["ok"] for each in tried)}
         else:
-            figures = uvloop.run(record_episodes(Choices(network, times, discard, redo, seed, pictures, keep), _say))
+            figures = uvloop.run(record_episodes(choices, _say))
     except ProfileError as error:
         raise typer.BadParameter(str(error)) from error
     except (ProcessFailed, ConsoleError, TimeoutError) as error:
         _say(str(error) or "an episode took too long")
         raise typer.Exit(EXIT_FAILED) from error
-    _say(_faults_table(figures) if faults else _table(figures))
+    if "faults" in figures:
+        _say(_faults_table(figures))
+    if "runs" in figures:
+        _say(_table(figures))
     if json_to == "-":
         sys.stdout.write(json.dumps(figures) + "\n")
     elif json_to:
@@ -99,12 +110,10 @@ def _table(figures: dict[str, Any]) -> str:
 
 
 def _faults_table(figures: dict[str, Any]) -> str:
-    lines = ["", "| fault | the console said | kept | in the dataset | |", "|---|---|--:|--:|---|"]
+    lines = ["", "| fault | the console said | |", "|---|---|---|"]
     for each in figures["faults"]:
         right = "right" if each["ok"] else f"WRONG: {'; '.join(each['wrong'])}"
-        lines.append(
-            f"| {each['fault']} | {'; '.join(each['said'])} | {each['kept']} | {each['in_dataset']} | {right} |"
-        )
+        lines.append(f"| {each['fault']} | {'; '.join(each['said'])} | {right} |")
     return "\n".join(lines)
 
 

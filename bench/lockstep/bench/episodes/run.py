@@ -17,7 +17,7 @@ from lockstep.bench.experiment.stage import Stage, running_stage
 from lockstep.bench.pick_place.run import recorder_of
 from lockstep.emulator.impairment.profile import load_profile
 
-__all__ = ["ROBOT", "Choices", "record_episodes"]
+__all__ = ["LINK_SECONDS", "ROBOT", "Choices", "figures_of", "keep_files", "links_of", "record_episodes"]
 
 ROBOT: Final = "so101"
 NO_NETWORK: Final = "perfect"
@@ -53,10 +53,8 @@ async def record_episodes(choices: Choices, say: Callable[[str], None]) -> dict[
     settings = {"LOCKSTEP_EPISODES__COUNTDOWN_SECONDS": COUNTDOWN}
     media, through = media_of(profile), bool(choices.network)
     async with running_stage(ROBOT, profile, media, choices.seed, robot_link=through, settings=settings) as stage:
-        link = stage.link if through else stage.near_link
         async with recorder_of(stage.near_link) as recorder:
-            links = [link, link, await _policy_link(recorder, stage, through=through)]
-            named = list(zip(DRIVERS, links, strict=True))
+            named = await links_of(stage, recorder, through=through)
             async with drivers(named, pictures=choices.pictures) as consoles:
                 (await recorder.post("/api/recordings", json={"name": "episodes"})).raise_for_status()
                 stage.network.begin()
@@ -69,13 +67,15 @@ async def record_episodes(choices: Choices, say: Callable[[str], None]) -> dict[
         said = await export(recordings, root)
         kept = [each.kept for each in done if each.kept is not None]
         dataset = {"wrong": [f"export: {said}"]} if said else await judged(root, kept)
-        if choices.keep is not None:
-            choices.keep.mkdir(parents=True, exist_ok=True)
-            for path in recordings:
-                await asyncio.to_thread(shutil.copy, path, choices.keep)
-            if root.exists():
-                await asyncio.to_thread(shutil.copytree, root, choices.keep / "dataset", dirs_exist_ok=True)
-    return _figures(choices, done, dataset)
+        await asyncio.to_thread(keep_files, choices.keep, recordings, root)
+    return figures_of(choices, done, dataset)
+
+
+async def links_of(stage: Stage, console: httpx.AsyncClient, *, through: bool) -> list[tuple[str, str]]:
+    """Return the name and link of each of DRIVERS. `through`: they are reached through the network."""
+    link = stage.link if through else stage.near_link
+    links = [link, link, await _policy_link(console, stage, through=through)]
+    return list(zip(DRIVERS, links, strict=True))
 
 
 async def _policy_link(console: httpx.AsyncClient, stage: Stage, *, through: bool) -> str:
@@ -85,11 +85,23 @@ async def _policy_link(console: httpx.AsyncClient, stage: Stage, *, through: boo
     return stage.network.link(link) if through else link
 
 
-def _figures(choices: Choices, done: Sequence[Done], dataset: dict[str, Any]) -> dict[str, Any]:
-    rows = iter(zip(dataset.get("rows", []), dataset.get("left_out", []), strict=False))
+def keep_files(folder: Path | None, recordings: Sequence[Path], root: Path) -> None:
+    """Copy the recordings, and the dataset if there is one, to a folder; None: nothing is kept."""
+    if folder is None:
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    for path in recordings:
+        shutil.copy(path, folder)
+    if root.exists():
+        shutil.copytree(root, folder / "dataset", dirs_exist_ok=True)
+
+
+def figures_of(choices: Choices, done: Sequence[Done], dataset: dict[str, Any]) -> dict[str, Any]:
+    found = zip(dataset.get("expected", []), dataset.get("rows", []), dataset.get("left_out", []), strict=False)
+    rows = {kept["episode"]: (rows, left_out) for kept, rows, left_out in found}
     episodes = []
     for each in done:
-        of_dataset = next(rows, (0, 0)) if each.kept is not None else (0, 0)
+        of_dataset = rows.get("" if each.kept is None else each.kept.episode, (0, 0))
         figures = asdict(each) | {"kept": each.kept is not None, "rows": of_dataset[0], "left_out": of_dataset[1]}
         episodes.append(figures)
     return {

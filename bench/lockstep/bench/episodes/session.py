@@ -105,6 +105,12 @@ class Session:
         self._say(_line(done))
         return done
 
+    async def person(self) -> Console:
+        """Return the console of a person who holds the seat; who else held it is at rest."""
+        if self._holder == POLICY:
+            await self._take_over(self._person)
+        return self._asks()
+
     def _asks(self) -> Console:
         """Return the console of the person who may say what becomes of the episode."""
         return self._consoles[self._person]

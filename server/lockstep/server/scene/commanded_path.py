@@ -17,7 +17,17 @@ from typing import NamedTuple, Self
 from lockstep.protocol.description import Axis, BodyTwist, PlanarBase, RobotDescription
 from lockstep.protocol.description import Pose as CommandedPose
 from lockstep.protocol.messages import Feedback
-from lockstep.server.scene.kinematics import Pose, about, inverse, joined, product, rotate, world_poses
+from lockstep.server.scene.kinematics import (
+    STILL,
+    Pose,
+    about,
+    frame_pose,
+    inverse,
+    joined,
+    product,
+    rotate,
+    world_poses,
+)
 
 __all__ = ["CommandedPath"]
 
@@ -62,7 +72,7 @@ class CommandedPath:
         bodies = {body.name for body in description.bodies}
         self._twists = [each for each in description.body_twists if {each.body, each.frame} <= bodies | {""}]
         self._has_goal_joints = any(axis.kind == "goal" and axis.name in known for axis in description.axes)
-        frames = bodies | {""}
+        frames = bodies | {""} | {camera.name for camera in description.cameras if camera.calibration is not None}
         self._poses = [each for each in description.poses if each.body in bodies and each.frame in frames]
         self._commands: dict[int, tuple[float | None, ...]] = {}
         self._records: deque[_Record] = deque(maxlen=MAX_RECORDS)
@@ -110,7 +120,8 @@ class CommandedPath:
                 poses[twist.body] = _moved_body(twist, before, poses, spans)
         for pose in self._poses:
             if any(name in goals for name in (*pose.position, *pose.rotation)):
-                poses[pose.body] = _body_at(pose, poses, goals)
+                frame = frame_pose(self._description, pose.frame, poses) or STILL
+                poses[pose.body] = _body_at(pose, frame, poses[pose.body], goals)
         return poses
 
     def wanted(self, values: Sequence[float | None]) -> dict[str, Pose] | None:
@@ -129,7 +140,8 @@ class CommandedPath:
         poses = world_poses(self._description, joints | self._joints_at(goals, joints))
         for pose in self._poses:
             if any(name in goals for name in (*pose.position, *pose.rotation)):
-                poses[pose.body] = _body_at(pose, poses, goals)
+                frame = frame_pose(self._description, pose.frame, poses) or STILL
+                poses[pose.body] = _body_at(pose, frame, poses[pose.body], goals)
         return poses
 
     def _spans(self) -> list[_Span]:
@@ -239,12 +251,13 @@ def _goal(axis: Axis, value: float, measured: float) -> _Goal:
     return _Goal(value, value - measured)
 
 
-def _body_at(pose: CommandedPose, poses: Mapping[str, Pose], goals: Mapping[str, _Goal]) -> Pose:
-    """Return the body at the goals of the pose's axes; it keeps what these do not say."""
-    here = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
-    frame = poses.get(pose.frame, here)
-    body = joined(inverse(frame), poses[pose.body])
-    point = joined(body, Pose(pose.point, here.orientation)).position
+def _body_at(pose: CommandedPose, frame: Pose, measured: Pose, goals: Mapping[str, _Goal]) -> Pose:
+    """Return the body at the goals of the pose's axes, in the world; it keeps what these do not say.
+
+    `frame`: of the goals. `measured`: where the body is. Both in the world.
+    """
+    body = joined(inverse(frame), measured)
+    point = joined(body, Pose(pose.point, STILL.orientation)).position
     x, y, z = (goals[name].value if name in goals else place for name, place in zip(pose.position, point, strict=True))
     orientation = body.orientation
     if all(name in goals for name in pose.rotation):

@@ -7,9 +7,11 @@ from typing import NamedTuple
 from lockstep.protocol.description import Body, BodyJoint, RobotDescription
 
 __all__ = [
+    "STILL",
     "Pose",
     "about",
     "body_pose",
+    "frame_pose",
     "inverse",
     "joined",
     "product",
@@ -30,12 +32,29 @@ class Pose(NamedTuple):
     orientation: Quaternion
 
 
+STILL = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+
+
 def body_pose(body: Body, joints: Mapping[str, float]) -> Pose:
     """Return the pose in the parent. The body's joints act in list order, in its frame, after its fixed pose."""
     pose = Pose(body.position, body.orientation)
     for joint in body.joints:
         pose = _moved(pose, joint, joints.get(joint.joint, 0.0))
     return pose
+
+
+def frame_pose(description: RobotDescription, name: str, bodies: Mapping[str, Pose]) -> Pose | None:
+    """Return where the frame of a body or camera is in the world; "": the world's. None where that is not known.
+
+    `bodies`: in the world.
+    """
+    if not name or name in bodies:
+        return bodies.get(name, STILL)
+    view = next((each.calibration for each in description.cameras if each.name == name), None)
+    if view is None:
+        return None
+    body = bodies.get(view.body) if view.body else STILL
+    return None if body is None else joined(body, Pose(view.position, view.orientation))
 
 
 def scene_paths(description: RobotDescription) -> dict[str, str]:

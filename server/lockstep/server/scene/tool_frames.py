@@ -8,11 +8,10 @@ import viser
 from lockstep.protocol.description import Pose as ToolPose
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Feedback
-from lockstep.server.scene.kinematics import Pose, about, inverse, joined
+from lockstep.server.scene.kinematics import STILL, Pose, about, frame_pose, inverse, joined
 
 __all__ = ["SceneTools", "goal_pose", "tool_place"]
 
-HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 AXIS = 0.16  # of the robot's radius
 THICK = 0.05  # of an axis' length
 SAME_PLACE = 0.003  # m
@@ -22,7 +21,7 @@ SAME_TURN = math.cos(0.02)  # of half the angle
 def tool_place(pose: ToolPose, bodies: Mapping[str, Pose]) -> Pose | None:
     """Return where a tool is in the world; None if there is no such body."""
     body = bodies.get(pose.body)
-    return None if body is None else joined(body, Pose(pose.point, HERE.orientation))
+    return None if body is None else joined(body, Pose(pose.point, STILL.orientation))
 
 
 def goal_pose(
@@ -31,26 +30,14 @@ def goal_pose(
     """Return where a tool is to be in the world; None where that is not known."""
     values = {axis.name: goal for axis, goal in zip(description.axes, goals, strict=False)}
     place, turn = ([values.get(name) for name in names] for names in (pose.position, pose.rotation))
-    frame, measured = _frame(description, pose, bodies), tool_place(pose, bodies)
+    frame, measured = frame_pose(description, pose.frame, bodies), tool_place(pose, bodies)
     x, y, z = place
     if frame is None or measured is None or x is None or y is None or z is None:
         return None
     rx, ry, rz = turn
     if rx is None or ry is None or rz is None:  # it turns as it was measured
-        return Pose(joined(frame, Pose((x, y, z), HERE.orientation)).position, measured.orientation)
+        return Pose(joined(frame, Pose((x, y, z), STILL.orientation)).position, measured.orientation)
     return joined(frame, Pose((x, y, z), about((rx, ry, rz), math.hypot(rx, ry, rz))))
-
-
-def _frame(description: RobotDescription, pose: ToolPose, bodies: Mapping[str, Pose]) -> Pose | None:
-    if not pose.frame:
-        return HERE
-    if pose.frame in bodies:
-        return bodies[pose.frame]
-    view = next((each.calibration for each in description.cameras if each.name == pose.frame), None)
-    if view is None:
-        return None
-    body = bodies.get(view.body) if view.body else HERE
-    return None if body is None else joined(body, Pose(view.position, view.orientation))
 
 
 class SceneTools:

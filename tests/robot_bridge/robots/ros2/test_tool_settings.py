@@ -53,9 +53,33 @@ def test_an_arm_on_a_base_has_its_pose_in_the_bases_frame(tmp_path: Path) -> Non
     assert [axis.kind for axis in description.axes] == ["rate"] + ["goal"] * 12
 
 
+VIEW = "fx: 300, fy: 300, cx: 160, cy: 120, position: [-1, 0, 0.5], orientation: [0.5, -0.5, 0.5, -0.5]"
+CAMERA = f"cameras:\n  - {{name: front, topic: /c, width: 320, height: 240, calibration: {{{VIEW}}}}}\n"
+FRAME = "  tool: {tip: wrist_3, frame: front}\n"
+
+
+def test_a_tool_in_a_cameras_frame_is_where_the_camera_sees_it(tmp_path: Path) -> None:
+    """The camera looks along the world's x, from 1 m behind its origin and 0.5 m above it."""
+    joints, zero = [0.3, -1.0, 1.0, 0.2, 0.5, 0.1], [0.0] * 6
+    plain, robot = read_settings(settings(tmp_path, "  tool: {tip: wrist_3}\n"))
+    assert plain.arm is not None
+    x, y, z, *turn = arm_tool(plain.arm, robot, joints).pose_at(joints)
+    arm, description = read_settings(settings(tmp_path, FRAME, more=CAMERA))
+    assert arm.arm is not None
+    assert description.poses[0].frame == "front"
+    seen = arm_tool(arm.arm, description, joints).pose_at(joints)
+    assert seen == pytest.approx((-y, 0.5 - z, x + 1.0, -turn[1], -turn[2], turn[0]))
+    assert arm_tool(arm.arm, description, zero).pose_at(zero)[3:] == pytest.approx((0, 0, 0), abs=1e-6)
+    assert [axis.label for axis in description.axes[-6:-3]] == ["Tool right", "Tool down", "Tool away"]
+
+
 @pytest.mark.parametrize(
     ("arm", "more", "words"),
     [
+        (FRAME, "", "arm.tool.frame: there is no camera 'front'"),
+        (FRAME, CAMERA.split(", calibration")[0] + "}\n", "the camera 'front' needs a calibration"),
+        (FRAME, CAMERA.replace("position:", "body: forearm, position:"), "a joint moves forearm against the world"),
+        (FRAME.replace("front", "upper_arm"), CAMERA.replace("front", "upper_arm"), "is the name of a body too"),
         ("  tool: {tip: hand}\n", "", "arm.tool.tip: hand does not hang on the world"),
         ("  tool: {tip: upper_arm}\n", "", "between upper_arm and the world are 2 joints of the arm; a pose needs 3"),
         ("  tool: {tip: wrist_3, posture: [0, 1]}\n", "", "needs one value for each of the 6 joints"),

@@ -88,7 +88,8 @@ def describe(settings: Ros2Settings) -> RobotDescription:
     if arm is not None and arm.tool is not None:
         from lockstep.robot_bridge.robots.ros2.tool import describe_tool  # needs numpy, as few robots do
 
-        tool = describe_tool(arm, bodies, settings.hold)
+        cameras = {camera.name: camera.calibration for camera in settings.cameras}
+        tool = describe_tool(arm, bodies, cameras, settings.hold)
     if settings.servo is not None:
         arm_axes = _servo_axes(settings.servo, settings.hold)
     layers: tuple[ControlLayer, ...] = ()

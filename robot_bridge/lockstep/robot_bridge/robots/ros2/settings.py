@@ -113,7 +113,7 @@ class ArmJoint(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class ToolObstacle(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the arm keeps off: a plane, or a box if it has a size. In the frame of the tool's pose."""
+    """What the arm keeps off: a plane, or a box if it has a size. In the frame of what the arm stands on."""
 
     name: Name  # as in "the arm is close to …"
     position: Vector3 = (0.0, 0.0, 0.0)  # m, of a place on the plane, or of the box' middle
@@ -126,6 +126,7 @@ class Tool(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     tip: Name  # a body, or a link of the URDF
     point: Vector3 = (0.0, 0.0, 0.0)  # m, of the tool in the tip's frame
+    frame: Annotated[str, Meta(max_length=64)] = ""  # a camera with a calibration; "": of what the arm stands on
     linear: Positive | None = None  # m/s, the fastest along x, y and z; None: by the arm's length, at most 0.25
     posture: Annotated[tuple[float, ...], Meta(max_length=64)] = ()  # of the joints, where the tool's rotation is zero
     obstacles: Annotated[tuple[ToolObstacle, ...], Meta(max_length=8)] = ()

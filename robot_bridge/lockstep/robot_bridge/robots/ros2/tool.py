@@ -1,12 +1,12 @@
 """Makes the pose of an arm's tool from the settings: its axes, its body, and the inverse kinematics."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from lockstep.protocol.description import Body, ControlLayer, Pose, RobotDescription
+from lockstep.protocol.description import Body, CameraCalibration, ControlLayer, Pose, RobotDescription
 from lockstep.robot_bridge.kinematics.body_capsules import body_capsules
 from lockstep.robot_bridge.kinematics.capsules import separate_pairs
 from lockstep.robot_bridge.kinematics.chain import Chain, NoChain
@@ -15,9 +15,10 @@ from lockstep.robot_bridge.kinematics.obstacles import Obstacle, Obstacles, plan
 from lockstep.robot_bridge.kinematics.pose_solver import JointBounds
 from lockstep.robot_bridge.kinematics.rotations import quaternion
 from lockstep.robot_bridge.kinematics.surfaces import body_surfaces
+from lockstep.robot_bridge.kinematics.views import View, view_from
 from lockstep.robot_bridge.robots.ros2.settings import Arm, ToolObstacle
 from lockstep.robot_bridge.robots.tool_pose.arm_solver import tool_solver
-from lockstep.robot_bridge.robots.tool_pose.axes import ToolAxes, shortest_hold, tool_axes, tool_layer
+from lockstep.robot_bridge.robots.tool_pose.axes import ToolAxes, picture_layer, shortest_hold, tool_axes, tool_layer
 from lockstep.robot_bridge.robots.tool_pose.posed_tool import PosedTool, ToolPlace, tool_pose
 from lockstep.robot_bridge.yaml_file import SettingsPlace
 
@@ -38,7 +39,10 @@ class ToolDescription(NamedTuple):
     layer: ControlLayer
 
 
-def describe_tool(arm: Arm, bodies: Sequence[Body], hold: float) -> ToolDescription:
+Cameras = Mapping[str, CameraCalibration | None]  # by name
+
+
+def describe_tool(arm: Arm, bodies: Sequence[Body], cameras: Cameras, hold: float) -> ToolDescription:
     """Return the tool's part of the description. `bodies`: of the robot.
 
     Raises:
@@ -51,8 +55,10 @@ def describe_tool(arm: Arm, bodies: Sequence[Body], hold: float) -> ToolDescript
         raise SettingsPlace((*KEYS, "tip"), f"a tool needs a hold of {shortest_hold():g} s at least, not {hold:g} s")
     joints = {joint.name: number for number, joint in enumerate(arm.joints)}
     base = _base(bodies, tool.tip, set(joints))
+    view = _view(tool.frame, bodies, cameras, base)
+    root, seen = ("", view.bodies(bodies)) if view is not None else (base, list(bodies))  # of the pose's frame
     try:
-        chain = Chain(bodies, tool.tip, base)
+        chain = Chain(seen, tool.tip, root)
     except NoChain as error:
         raise SettingsPlace((*KEYS, "tip"), str(error)) from error
     if len(chain.joints) < FEWEST:
@@ -69,14 +75,15 @@ def describe_tool(arm: Arm, bodies: Sequence[Body], hold: float) -> ToolDescript
                 raise SettingsPlace((*KEYS, "obstacles", number, key), f"needs numbers up to {FARTHEST:g}")
         if not any(each.normal):
             raise SettingsPlace((*KEYS, "obstacles", number, "normal"), "has no direction")
-    turn = np.eye(3)
+    turn = np.eye(3) if view is None else view.rotation
     if tool.posture:
         turn = chain.at([tool.posture[joints[name]] for name in chain.joints]).rotation.T
     body = Body(name=f"{tool.tip}.tool", parent=tool.tip, position=tool.point, orientation=quaternion(turn))
-    chain = Chain((*bodies, body), body.name, base)
-    axes = tool_axes(NAME, "Tool", chain.begins.tolist(), chain.length, tool.linear)
-    pose = tool_pose(NAME, "Tool", body.name, axes, [f"arm.{name}" for name in chain.joints], base)
-    return ToolDescription(axes, body, pose, tool_layer(NAME, "Tool", axes.names))
+    chain = Chain((*seen, body), body.name, root)
+    axes = tool_axes(NAME, "Tool", chain.begins.tolist(), chain.length, tool.linear, in_picture=view is not None)
+    pose = tool_pose(NAME, "Tool", body.name, axes, [f"arm.{name}" for name in chain.joints], tool.frame or base)
+    layer = tool_layer if view is None else picture_layer
+    return ToolDescription(axes, body, pose, layer(NAME, "Tool", axes.names))
 
 
 def arm_tool(arm: Arm, description: RobotDescription, measured: Sequence[float]) -> PosedTool:
@@ -84,7 +91,11 @@ def arm_tool(arm: Arm, description: RobotDescription, measured: Sequence[float])
     (pose,) = description.poses
     axes = {axis.name: axis for axis in description.axes}
     base = _base(description.bodies, pose.body, {joint.name for joint in arm.joints})
-    chain = Chain(description.bodies, pose.body, base)
+    cameras = {camera.name: camera.calibration for camera in description.cameras}
+    frame = "" if arm.tool is None else arm.tool.frame
+    view = _view(frame, description.bodies, cameras, base)
+    root, seen = ("", view.bodies(description.bodies)) if view is not None else (base, list(description.bodies))
+    chain = Chain(seen, pose.body, root)
     numbers = {joint.name: number for number, joint in enumerate(arm.joints)}
     places = tuple(numbers[name] for name in chain.joints)
     joints = [axes[f"arm.{name}"] for name in chain.joints]
@@ -96,10 +107,12 @@ def arm_tool(arm: Arm, description: RobotDescription, measured: Sequence[float])
     posture = [measured[number] for number in places]
     given = arm.tool.posture if arm.tool is not None else ()
     home = [given[number] for number in places] if given else None
-    capsules = body_capsules([body for body in description.bodies if chain.has(body.name)])
+    capsules = body_capsules([body for body in seen if chain.has(body.name)])
     pairs = separate_pairs(chain, capsules, home or posture)
     obstacles = tuple(map(_obstacle, arm.tool.obstacles if arm.tool is not None else ()))
-    stands = Obstacles(chain, body_surfaces(description.bodies, chain) if obstacles else {}, obstacles)
+    if view is not None:
+        obstacles = tuple(map(view.obstacle, obstacles))
+    stands = Obstacles(chain, body_surfaces(seen, chain) if obstacles else {}, obstacles)
     return PosedTool(
         pose.name,
         ToolPlace(places, tuple(range(len(arm.joints), len(arm.joints) + 6))),
@@ -115,6 +128,28 @@ def arm_tool(arm: Arm, description: RobotDescription, measured: Sequence[float])
         bounds.rates,
         posture,
     )
+
+
+def _view(name: str, bodies: Sequence[Body], cameras: Cameras, base: str) -> View | None:
+    """Return the view of the camera in whose frame the pose is; None: it is in the base's.
+
+    Raises:
+        SettingsPlace: there is no such camera, nobody knows where it is, or it moves against the base.
+    """
+    if not name:
+        return None
+    where = (*KEYS, "frame")
+    if name not in cameras:
+        raise SettingsPlace(where, f"there is no camera {name!r}")
+    found = cameras[name]
+    if found is None:
+        raise SettingsPlace(where, f"the camera {name!r} needs a calibration, which says where it is")
+    if any(body.name == name for body in bodies):
+        raise SettingsPlace(where, f"{name!r} is the name of a body too")
+    try:
+        return view_from(bodies, base, found.body, found.position, found.orientation)
+    except NoChain as error:
+        raise SettingsPlace(where, str(error)) from error
 
 
 def _obstacle(given: ToolObstacle) -> Obstacle:

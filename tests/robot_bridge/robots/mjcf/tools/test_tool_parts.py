@@ -9,7 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lockstep.robot_bridge.errors import ModelError
 from tests.robot_bridge.robots.mjcf.tools.arms import SEVEN_JOINTS, SIX_JOINTS, arm_model
+from tests.robot_bridge.robots.mjcf.tools.test_tool_setting import SETTING
 from tests.robot_bridge.robots.mjcf.tools.world import HOLD, World, parts_in
 
 ARMS = {6: arm_model(SIX_JOINTS), 7: arm_model(SEVEN_JOINTS)}
@@ -152,3 +154,81 @@ def test_an_arm_on_a_base_that_moves_has_its_pose_in_the_bases_frame() -> None:
     assert (parts.pose.frame, fixed.pose.frame) == ("base", "")
     home = parts.tool.goals
     assert np.subtract(fixed.tool.pose_at(home), parts.tool.pose_at(home))[:3] == pytest.approx((0.1, 0.2, 0.0))
+
+
+SEEN = SETTING.format("grip@overview")
+
+
+def in_camera(text: str, joints: tuple[float, ...]) -> tuple[float, ...]:
+    """Return where the grip is for the model's camera: right, down and ahead of it, as MuJoCo has it."""
+    model: Any = mujoco.MjModel.from_xml_string(text)
+    data: Any = mujoco.MjData(model)
+    for name, value in zip([name for name, *_ in SIX_JOINTS], joints, strict=True):
+        data.joint(name).qpos = value
+    mujoco.mj_forward(model, data)
+    camera = data.camera("overview")
+    right, up, behind = (data.site("grip").xpos - camera.xpos) @ camera.xmat.reshape(3, 3)
+    return right, -up, -behind
+
+
+def test_a_tool_in_a_cameras_frame_moves_as_seen_in_its_picture() -> None:
+    world = World(arm_model(more=SEEN))
+    assert world.parts.pose.frame == "overview"
+    begun = [world.value(word) for word in WORDS]
+    assert begun == pytest.approx([*in_camera(ARMS[6], world.tool.goals), 0.0, 0.0, 0.0], abs=1e-5)
+    for way in ((0.1, 0.0, 0.0), (0.0, -0.1, 0.0), (0.0, 0.0, -0.1)):
+        there = tuple(np.add(begun[:3], way).tolist())
+        world.approach(goals(world, (*there, 0.0, 0.0, 0.0)), 40)
+        assert in_camera(ARMS[6], world.tool.goals) == pytest.approx(there, abs=3e-3)
+    assert world.fastest_change() < 0.4
+
+
+def test_a_stick_moves_a_tool_in_a_cameras_frame_right_and_up_in_the_picture() -> None:
+    parts, axes = parts_in(arm_model(more=SEEN))
+    assert [axis.label for axis in axes[-6:]] == [
+        *("Grip right", "Grip down", "Grip away"),
+        *("Grip nose up", "Grip nose right", "Grip turn clockwise"),
+    ]
+    keys = {(each.axis, each.key_positive, each.key_negative) for each in parts.layer.bindings}
+    assert {("grip.x", "KeyD", "KeyA"), ("grip.y", "KeyS", "KeyW"), ("grip.z", "KeyR", "KeyF")} <= keys
+    sticks = {each.axis: (each.pad, each.invert_pad, each.invert_touch) for each in parts.layer.bindings}
+    assert sticks["grip.x"] == ("left_x", False, False)  # right is positive, of pads and touch sticks
+    assert sticks["grip.y"] == ("left_y", False, True)  # a pad gives down as positive, a touch stick up
+
+
+def test_a_camera_on_a_base_that_moves_has_the_pose_of_an_arm_there() -> None:
+    rail = '<joint name="rail" type="slide" axis="1 0 0" range="-1 1"/>'
+    text = arm_model(base=rail, more=SEEN)
+    camera = text[text.index("<camera") : text.index("/>", text.index("<camera")) + 2]
+    carried = text.replace(camera, "").replace(rail, rail + camera)
+    with pytest.raises(ModelError, match="the world does not stand on base"):
+        parts_in(text)
+    parts, _ = parts_in(carried)
+    home = parts.tool.goals
+    assert parts.tool.pose_at(home)[:3] == pytest.approx(in_camera(carried, home), abs=1e-5)
+
+
+def test_the_floor_is_kept_off_in_a_cameras_frame_too() -> None:
+    text = arm_model(more=SEEN.replace("</custom>", '<text name="lockstep_obstacles" data="floor"/></custom>'))
+    world = World(text)
+    begun = np.array([world.value(word) for word in WORDS])
+    down = np.array([*in_world_down(text), 0.0, 0.0, 0.0])
+    for step in range(120):
+        world.command(goals(world, tuple((begun + 0.01 * step * down).tolist())))
+    assert "the arm is close to the floor" in world.tool.faults
+    model: Any = mujoco.MjModel.from_xml_string(text)
+    data: Any = mujoco.MjData(model)
+    for joints in world.way[::10]:
+        data.qpos[:6] = joints
+        mujoco.mj_forward(model, data)
+        assert data.site("grip").xpos[2] > 0.0
+        assert model.geom("floor").id not in data.contact.geom
+
+
+def in_world_down(text: str) -> list[float]:
+    """Return the world's way down, for the model's camera."""
+    model: Any = mujoco.MjModel.from_xml_string(text)
+    data: Any = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    right, up, behind = (np.array([0.0, 0.0, -1.0]) @ data.camera("overview").xmat.reshape(3, 3)).tolist()
+    return [right, -up, -behind]

@@ -9,18 +9,21 @@ import numpy as np
 from lockstep.protocol.description import Axis, Binding, Body, ControlLayer, Pose
 from lockstep.robot_bridge.errors import ModelError
 from lockstep.robot_bridge.kinematics.capsules import separate_pairs
-from lockstep.robot_bridge.kinematics.chain import Chain
+from lockstep.robot_bridge.kinematics.chain import Chain, NoChain
 from lockstep.robot_bridge.kinematics.clearance import Clearance, GapSource
 from lockstep.robot_bridge.kinematics.obstacles import Obstacles
 from lockstep.robot_bridge.kinematics.pose_solver import JointBounds
 from lockstep.robot_bridge.kinematics.rotations import quaternion
+from lockstep.robot_bridge.kinematics.views import View, view_from
+from lockstep.robot_bridge.robots.mjcf.cameras import cameras_of
 from lockstep.robot_bridge.robots.mjcf.drives import Drive
 from lockstep.robot_bridge.robots.mjcf.names import label_of, name_of
 from lockstep.robot_bridge.robots.mjcf.tools.capsules import capsules_of, may_touch
 from lockstep.robot_bridge.robots.mjcf.tools.obstacles import OBSTACLES, obstacles_of, surfaces_of
-from lockstep.robot_bridge.robots.mjcf.tools.tool_setting import ModelTool
+from lockstep.robot_bridge.robots.mjcf.tools.tool_setting import TEXT, ModelTool
+from lockstep.robot_bridge.robots.mujoco_view.calibration import calibrated
 from lockstep.robot_bridge.robots.tool_pose.arm_solver import tool_solver
-from lockstep.robot_bridge.robots.tool_pose.axes import tool_axes, tool_layer
+from lockstep.robot_bridge.robots.tool_pose.axes import picture_layer, tool_axes, tool_layer
 from lockstep.robot_bridge.robots.tool_pose.posed_tool import PosedTool, ToolPlace, tool_pose
 
 __all__ = ["ToolParts", "tool_parts"]
@@ -46,7 +49,8 @@ def tool_parts(
     """Return the parts of one tool. `first`: number of its first axis. `data` has the model's first posture.
 
     Raises:
-        ModelError: the model names obstacles that it has not, or for an arm that does not stand still.
+        ModelError: the model names obstacles that it has not, or for an arm that does not stand still; or a camera
+            that does not stand where the arm does.
     """
     numbers = {drive.actuator.number: number for number, drive in enumerate(drives)}
     places = tuple(numbers[servo.number] for servo in tool.servos)
@@ -55,10 +59,12 @@ def tool_parts(
     indices = tuple(int(model.jnt_qposadr[joint]) for joint in joints)
     posture = [float(data.qpos[index]) for index in indices]
     base = name_of(model, "body", tool.path[0]) if _moves(model, tool.path[0]) else ""
-    body = _tool_body(model, tool, bodies, base, posture)
-    chain = Chain((*bodies, body), body.name, base)
+    view = _view(model, tool, bodies, base) if tool.camera else None
+    root, seen = (base, list(bodies)) if view is None else ("", view.bodies(bodies))  # of the pose's frame
+    body = _tool_body(model, tool, seen, root, posture)
+    chain = Chain((*seen, body), body.name, root)
     label = label_of(tool.name)
-    axes = tool_axes(tool.name, label, chain.begins.tolist(), chain.length)
+    axes = tool_axes(tool.name, label, chain.begins.tolist(), chain.length, in_picture=view is not None)
     bounds = JointBounds(
         lower=tuple(-np.inf if drive.axis.wrap else drive.axis.minimum for drive in own),
         upper=tuple(np.inf if drive.axis.wrap else drive.axis.maximum for drive in own),
@@ -70,18 +76,40 @@ def tool_parts(
     if obstacles := obstacles_of(model, data):
         if base:
             raise ModelError(f"{OBSTACLES} needs an arm that stands still, and {tool.name!r} stands on {base!r}")
+        if view is not None:
+            obstacles = tuple(map(view.obstacle, obstacles))
         keeps_off.append(Obstacles(chain, surfaces_of(model, data, tool.path), obstacles))
     solver = tool_solver(chain, bounds, axes, keeps_off=keeps_off, posture=posture)
-    pose = tool_pose(tool.name, label, body.name, axes, [drive.axis.name for drive in own], base)
+    pose = tool_pose(tool.name, label, body.name, axes, [drive.axis.name for drive in own], tool.camera or base)
+    layer = tool_layer if view is None else picture_layer
     place = ToolPlace(places, tuple(range(first, first + len(axes.all))))
     return ToolParts(
         axes.all,
         body,
         pose,
-        tool_layer(tool.name, label, axes.names, *_grip(model, tool, drives)),
+        layer(tool.name, label, axes.names, *_grip(model, tool, drives)),
         PosedTool(tool.name, place, chain, solver, bounds.rates, posture),
         indices,
     )
+
+
+def _view(model: Any, tool: ModelTool, bodies: Sequence[Body], base: str) -> View:
+    """Return the view of the tool's camera. `base`: on which the arm stands.
+
+    Raises:
+        ModelError: it is no stream, no pinhole that tells its place, or moves against the base.
+    """
+    where = f"{TEXT} names the camera {tool.camera!r}"
+    camera = next((each for each in cameras_of(model) if each.name == tool.camera), None)
+    if camera is None:
+        raise ModelError(f"{where}, which is not among the first ones, that become streams")
+    found = calibrated(camera, model, bodies).calibration
+    if found is None:
+        raise ModelError(f"{where}, of which the model tells no field of view and no fixed place")
+    try:
+        return view_from(bodies, base, found.body, found.position, found.orientation)
+    except NoChain as error:
+        raise ModelError(f"{where}: {error}") from error
 
 
 def _moves(model: Any, body: int) -> bool:

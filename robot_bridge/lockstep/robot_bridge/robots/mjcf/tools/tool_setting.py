@@ -1,7 +1,7 @@
 """Reads which tools of a model are driven by their pose: `<custom><text name="lockstep_tool" data="…"/></custom>`.
 
-A tool is a site or a body. The joints that its pose drives are those above it, up to the first one that no position
-actuator moves.
+A tool is a site or a body; the pose of "grip@overview" is in the frame of the camera "overview". The joints that a pose
+drives are those above the tool, up to the first one that no position actuator moves.
 """
 
 from collections.abc import Sequence
@@ -22,6 +22,7 @@ FEWEST: Final = 3  # joints: with less, no tool can be moved in three directions
 
 class ModelTool(NamedTuple):
     name: str  # "grip_site"
+    camera: str  # in whose frame the pose is; "": in that of what the arm stands on
     site: int | None  # None: the tool is the body itself
     path: tuple[int, ...]  # bodies, from that on which the arm stands to the tool's
     servos: tuple[Actuator, ...]  # of the joints, from the base to the tool
@@ -48,11 +49,14 @@ def tools_of(model: Any, actuators: Sequence[Actuator]) -> list[ModelTool]:
     return tools
 
 
-def _tool(model: Any, name: str, servos: dict[int, Actuator]) -> ModelTool:
+def _tool(model: Any, word: str, servos: dict[int, Actuator]) -> ModelTool:
+    name, _, camera = word.partition("@")
     site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
     body = int(model.site_bodyid[site]) if site >= 0 else mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
     if body < 0:
         raise ModelError(f"{TEXT} names {name!r}, which is neither a site nor a body")
+    if camera and mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, camera) < 0:
+        raise ModelError(f"{TEXT} names {word!r}, and the model has no camera {camera!r}")
     path, found = [body], list[Actuator]()
     while path[0]:
         first = int(model.body_jntadr[path[0]])
@@ -67,4 +71,4 @@ def _tool(model: Any, name: str, servos: dict[int, Actuator]) -> ModelTool:
             f"{TEXT} names {name!r}, between which and {above} are {len(found)} joints with a position actuator each;"
             f" a pose needs {FEWEST}"
         )
-    return ModelTool(name, site if site >= 0 else None, tuple(path), tuple(found))
+    return ModelTool(name, camera, site if site >= 0 else None, tuple(path), tuple(found))

@@ -1,0 +1,110 @@
+"""What the bar of episodes says at once when a camera hangs, and when the disk fills, in Chromium."""
+
+import asyncio
+import os
+import shutil
+import signal
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+from playwright.async_api import Browser, Locator, expect
+
+from lockstep.bench.browsers.console_page import open_console
+from lockstep.bench.episodes.faults import ROBOT
+from lockstep.bench.episodes.small_disk import small_disk
+from lockstep.bench.harness.driving import drive_on
+from lockstep.bench.harness.stack import running_bridge
+from lockstep.client import Console
+from lockstep.robot_bridge.robots.so101.model_source import FOLDER_VARIABLE
+from lockstep.server.recording.reading.reader import RecordingReader
+from tests.e2e.accessibility import findings
+from tests.e2e.recordings.test_chromium_episodes import SETTINGS
+from tests.e2e.so101 import SO101, needs_so101
+from tests.support.stack import Stack, running_console, running_stack
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(240)]
+
+SHOTS = os.environ.get("EPISODE_SHOTS", "")  # directory for pictures of the page, for people to look at
+DISK_BYTES = 64 << 20
+KEEPS_FREE = 16 << 20
+
+
+@asynccontextmanager
+async def _taking(chromium: Browser, stack: Stack, name: str) -> AsyncIterator[tuple[Locator, Console]]:
+    """A supervisor's page with an open episode, and another driver."""
+    async with (
+        open_console(chromium, stack.supervisor) as console,
+        Console(stack.operator, video=False, audio=False) as driver,
+    ):
+        await console.until_live()
+        await driver.take_seat()
+        bar = console.page.locator(".episode-bar")
+        await bar.locator(".episode-task").fill("push the box")
+        await bar.locator(".episode-task").press("Enter")
+        await expect(bar.locator(".episode-words")).to_contain_text("Take 1")
+        await expect(bar.locator(".episode-problems")).to_be_hidden()
+        yield bar, driver
+        assert await findings(console.page) == []
+        if SHOTS:
+            await console.page.screenshot(path=f"{SHOTS}/{name}.png")
+
+
+def _states(folder: Path) -> list[tuple[str, str]]:
+    (path,) = folder.glob("*.mcap")
+    with RecordingReader(path) as reader:
+        return [(each.state, each.why) for each in reader.index.episodes]
+
+
+@needs_so101
+async def test_the_page_names_a_camera_that_hangs_while_an_episode_is_recorded(
+    half_rate: None, tmp_path: Path, chromium: Browser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(FOLDER_VARIABLE, SO101[FOLDER_VARIABLE])
+    monkeypatch.setenv("LOCKSTEP_EPISODES__COUNTDOWN_SECONDS", "1")
+    async with running_bridge(ROBOT) as bridge:
+        record = ("--record", str(tmp_path / "recordings"))
+        async with (
+            running_console(tmp_path, bridge.address, bridge.event_log, record) as stack,
+            _taking(chromium, stack, "camera-hangs") as (bar, driver),
+        ):
+            hanging = driver.description.cameras[-1].name
+            bridge.process.signal(signal.SIGUSR1)
+            await expect(bar.locator(".episode-problems")).to_contain_text(f"{hanging}: no picture for ")
+            await expect(bar.locator(".episode-problems")).to_be_visible()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount a small disk")
+async def test_the_page_says_that_the_disk_fills_and_then_that_the_episode_is_lost(
+    tmp_path: Path, chromium: Browser
+) -> None:
+    recordings = tmp_path / "recordings"
+    recordings.mkdir()
+    settings = {**SETTINGS, "LOCKSTEP_RECORDING__FREE_BYTES": str(KEEPS_FREE)}
+    with small_disk(recordings, DISK_BYTES):
+        ballast = recordings / "ballast"
+        async with (
+            running_stack(tmp_path, settings=settings, extra=("--record", str(recordings))) as stack,
+            _taking(chromium, stack, "disk-full") as (bar, driver),
+        ):
+            await _fill(ballast, KEEPS_FREE * 9 // 8)
+            await expect(bar.locator(".episode-problems")).to_contain_text("the disk is almost full: ")
+            await drive_on(driver, [0.2, 0.0, 0.0])
+            await _fill(ballast, KEEPS_FREE // 2)
+            await expect(bar.locator(".episode-words")).to_contain_text("Episode 1 is lost: the recording failed")
+            await expect(bar.get_by_role("button", name="Keep")).to_be_disabled()
+        ballast.unlink()
+        assert _states(recordings) == [("cut", "recording_failed")]
+
+
+async def _fill(ballast: Path, free: int) -> None:
+    """Let the file grow until only so many bytes of its disk are free."""
+
+    def grow() -> None:
+        with ballast.open("ab") as file:
+            size = file.tell()
+            more = shutil.disk_usage(ballast.parent).free - free
+            os.posix_fallocate(file.fileno(), 0, size + more)
+
+    await asyncio.to_thread(grow)
