@@ -48,7 +48,7 @@ def test_a_run_names_its_day_its_machine_and_only_sections_that_exist(name: str)
     assert all(result.value is None or result.value >= 0 for result in results(name))
 
 
-@pytest.mark.parametrize("path", sorted((HISTORY / "robot_networks").iterdir()), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted(HISTORY.glob("*/*")), ids=lambda path: path.stem)
 def test_a_run_beside_the_benchmark_names_its_day_its_command_and_its_machine(path: Path) -> None:
     kept = json.loads(path.read_text())
     assert re.fullmatch(r"20\d\d-\d\d-\d\d-[0-9a-f]{7,}-[\w-]+\.json", path.name)

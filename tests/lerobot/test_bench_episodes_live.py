@@ -23,7 +23,7 @@ async def test_lerobot_trains_on_episodes_of_two_people_and_a_policy(tmp_path: P
         env={**os.environ, "SO101_MODEL_FOLDER": str(ROOT / ".so101")},
     )
     assert await bench.wait() == 0
-    told = json.loads(await asyncio.to_thread(figures.read_text))
+    [told] = json.loads(await asyncio.to_thread(figures.read_text))["runs"]
     root = kept / "dataset"
     assert told["dataset"]["policy"] > 0
     said = await run_lerobot(

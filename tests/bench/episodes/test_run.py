@@ -30,7 +30,7 @@ def test_a_dataset_of_people_and_a_policy_has_the_kept_episodes_alone_and_each_p
 ) -> None:
     done = CliRunner().invoke(app, [*FEW, "--keep", str(tmp_path), "--json", "-"])
     assert done.exit_code == 0, done.output
-    figures = json.loads(done.stdout)
+    [figures] = json.loads(done.stdout)["runs"]
     assert (figures["episodes"], figures["kept"], figures["discarded"], figures["redone"]) == (3, 2, 1, 1)
     assert [each["drivers"] for each in figures["runs"] if each["kept"]] == [["Grace"], ["net", "Grace", "net"]]
     assert (figures["with_policy"], figures["corrections"]) == (1, 1)
@@ -63,7 +63,8 @@ def _shift_events(root: Path) -> None:
 def test_a_console_that_is_killed_while_it_keeps_an_episode_leaves_a_dataset_of_whole_episodes() -> None:
     done = CliRunner().invoke(app, ["--fault", "kill-keeping", "--json", "-"])
     assert done.exit_code == 0, done.output
-    [fault] = json.loads(done.stdout)["faults"]
+    [figures] = json.loads(done.stdout)["runs"]
+    [fault] = figures["faults"]
     assert fault["ok"]
     assert 1 <= fault["kept"] <= fault["in_dataset"] <= 2
 

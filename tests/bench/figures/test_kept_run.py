@@ -4,6 +4,8 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 from lockstep.bench.figures.kept_run import kept_run
 
 
@@ -26,3 +28,9 @@ def test_the_command_is_the_one_that_makes_it_again() -> None:
     )
     found = json.loads(done.stdout.partition("}1 loop")[0] + "}")
     assert found["command"].startswith("python -m timeit -n 1 -r 1 -s ")
+
+
+def test_paths_of_this_machine_are_no_part_of_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = ["x", "--keep", "/tmp/kept", "--times", "3", "--json=/tmp/a.json", "--network", "lte-drive", "--json", "-"]
+    monkeypatch.setattr(sys, "argv", given)
+    assert kept_run(0, [])["command"].endswith(" --times 3 --network lte-drive")

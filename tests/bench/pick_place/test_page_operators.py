@@ -21,7 +21,7 @@ def test_a_page_puts_a_block_into_the_bowl(hand: str, monkeypatch: pytest.Monkey
     figures_file = tmp_path / "figures.json"
     done = CliRunner().invoke(app, ["--hand", hand, "--times", "1", "--json", str(figures_file)])
     assert done.exit_code == 0, done.output
-    figures = json.loads(figures_file.read_text())
+    [figures] = json.loads(figures_file.read_text())["runs"]
     assert (figures["hand"], figures["placed"], figures["verified"]) == (hand, 1, 1)
     assert (figures["jumps"], figures["violations"]) == (0, 0)
     assert figures["pictures"] > 0

@@ -24,7 +24,7 @@ def test_the_command_puts_a_block_into_the_bowl_and_keeps_its_verified_recording
     monkeypatch.setenv(FOLDER_VARIABLE, str(MODEL_FOLDER))
     done = CliRunner().invoke(app, ["--times", "1", "--no-pictures", "--keep", str(tmp_path), "--json", "-"])
     assert done.exit_code == 0, done.output
-    figures = json.loads(done.stdout)
+    [figures] = json.loads(done.stdout)["runs"]
     assert (figures["placed"], figures["verified"], figures["jumps"]) == (1, 1, 0)
     assert 0 < figures["largest_step"] <= 1
     [kept] = tmp_path.glob("*.mcap")

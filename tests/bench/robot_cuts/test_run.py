@@ -19,6 +19,7 @@ def test_the_figures_are_the_worst_of_all_cuts_and_count_the_good_ones() -> None
     found = figures([finding(), *bad])
     assert found["cuts"] == 4
     assert (found["rest_ms_worst"], found["back_ms_worst"], found["oldest_answer_ms"]) == (400.0, 2500.0, 2100.0)
+    assert found["own_outage_ms"] == [0.0] * 4
     assert [found[name] for name in ("rested_within_hold", "back_within_2_s", "nothing_late")] == [3, 3, 3]
 
 

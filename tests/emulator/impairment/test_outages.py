@@ -1,3 +1,5 @@
+import pytest
+
 from lockstep.emulator.impairment.outages import Outages, PlannedOutage, Silence
 
 
@@ -38,3 +40,22 @@ def test_one_on_demand_holds_now_and_of_several_the_longest_counts() -> None:
     assert outages.at(10.9) == Silence(13, False), "the new one is not on yet"
     assert outages.at(11.5) == Silence(13, False)
     assert outages.at(13) is None
+
+
+@pytest.mark.parametrize(
+    ("began", "ended", "seconds"),
+    [(100.0, 114.9, 0.0), (114.0, 115.2, 0.2), (115.2, 116.0, 0.3), (110.0, 160.0, 1.5), (135.1, 135.3, 0.2)],
+)
+def test_the_seconds_of_planned_outages_between_two_times_are_known(began: float, ended: float, seconds: float) -> None:
+    outages = Outages((PlannedOutage(at=15.0, lasts=0.5, every=20.0),))
+    assert outages.planned_seconds(began, ended) == 0.0, "the schedule has not begun"
+    outages.start(100.0)
+    assert outages.planned_seconds(began, ended) == pytest.approx(seconds)
+
+
+def test_an_outage_that_comes_once_counts_once() -> None:
+    outages = Outages((PlannedOutage(at=1.0, lasts=2.0),))
+    outages.start(0.0)
+    assert outages.planned_seconds(0.0, 100.0) == pytest.approx(2.0)
+    outages.demand(10.0, 5.0)
+    assert outages.planned_seconds(10.0, 15.0) == 0.0, "it was demanded, not planned"

@@ -15,6 +15,8 @@ from lockstep.bench.episodes.fault_alone import run_fault
 from lockstep.bench.episodes.faulted_day import record_faulted_day
 from lockstep.bench.episodes.faults import FAULTS, FaultName
 from lockstep.bench.episodes.run import Choices, record_episodes
+from lockstep.bench.figures.kept_run import kept_run
+from lockstep.bench.figures.machine import busy_percent
 from lockstep.bench.harness.processes import ProcessFailed
 from lockstep.client.errors import ConsoleError
 from lockstep.emulator.errors import ProfileError
@@ -22,6 +24,8 @@ from lockstep.emulator.errors import ProfileError
 __all__ = ["app"]
 
 EXIT_FAILED = 3
+
+LOOK_SECONDS = 1.5
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
@@ -51,6 +55,7 @@ def command(
     choices = Choices(network, times, discard, redo, seed, pictures, keep)
     if discard + redo > times:
         raise typer.BadParameter("more episodes are discarded and redone than there are")
+    busy = uvloop.run(busy_percent(LOOK_SECONDS))
     try:
         if among:
             figures: dict[str, Any] = uvloop.run(record_faulted_day(choices, faults, _say))
@@ -68,10 +73,11 @@ def command(
         _say(_faults_table(figures))
     if "runs" in figures:
         _say(_table(figures))
+    text = json.dumps(kept_run(busy, [figures]), indent=1) + "\n"
     if json_to == "-":
-        sys.stdout.write(json.dumps(figures) + "\n")
+        sys.stdout.write(text)
     elif json_to:
-        Path(json_to).write_text(json.dumps(figures, indent=1) + "\n")
+        Path(json_to).write_text(text)
     raise typer.Exit(0 if figures["ok"] else 1)
 
 

@@ -10,14 +10,18 @@ from lockstep.bench.figures.machine import machine_facts
 
 __all__ = ["kept_run"]
 
+PATHS = ("--json", "--keep")  # options with a path of this machine
 
-FILE = "--json"  # where the run is written: a path of this machine
 
-
-def _without_file(arguments: Sequence[str]) -> list[str]:
-    arguments = [each for each in arguments if not each.startswith(f"{FILE}=")]
-    at = arguments.index(FILE) if FILE in arguments else len(arguments)
-    return [*arguments[:at], *arguments[at + 2 :]]
+def _without_paths(arguments: Sequence[str]) -> list[str]:
+    kept: list[str] = []
+    words = iter(arguments)
+    for word in words:
+        if word in PATHS:
+            next(words, None)
+        elif not word.startswith(tuple(f"{each}=" for each in PATHS)):
+            kept.append(word)
+    return kept
 
 
 def kept_run(busy: float, runs: Sequence[Any]) -> dict[str, Any]:
@@ -29,7 +33,7 @@ def kept_run(busy: float, runs: Sequence[Any]) -> dict[str, Any]:
     module = "" if spec is None else spec.name.removesuffix(".__main__")
     return {
         "at": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "command": shlex.join(["python", "-m", module, *_without_file(sys.argv[1:])]),
+        "command": shlex.join(["python", "-m", module, *_without_paths(sys.argv[1:])]),
         "machine": machine_facts(),
         "busy_percent": round(busy),
         "runs": list(runs),

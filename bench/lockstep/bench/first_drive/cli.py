@@ -5,6 +5,7 @@ A person who reads takes longer; what is installed already is not installed agai
 
 import asyncio
 import json
+import os
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -37,6 +38,8 @@ def first_drive(
     with TemporaryDirectory(prefix="lockstep-first-drive-") as folder:
         found.append({"way": "template", "seconds": asyncio.run(drive_template(Path(folder), _say))})
     if ros_python:
+        if os.sep in ros_python:  # the terminal works in a folder of its own
+            ros_python = os.path.abspath(ros_python)
         with TemporaryDirectory(prefix="lockstep-first-drive-") as folder:
             seconds = asyncio.run(drive_discovered(Path(folder), ros_python, node.resolve(), _say))
             found.append({"way": "ros2 discover", "seconds": seconds})

@@ -11,6 +11,8 @@ from typing import Annotated, Any
 import typer
 import uvloop
 
+from lockstep.bench.figures.kept_run import kept_run
+from lockstep.bench.figures.machine import busy_percent
 from lockstep.bench.harness.processes import ProcessFailed
 from lockstep.bench.pick_place.operator import HandName, OperatorFailed
 from lockstep.bench.pick_place.run import Choices, pick_and_place
@@ -21,6 +23,8 @@ __all__ = ["app", "is_kept"]
 
 ROUNDING = 1e-3  # of the largest step
 EXIT_FAILED = 3
+
+LOOK_SECONDS = 1.5
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
@@ -42,6 +46,7 @@ def command(
     json_to: Annotated[str, typer.Option("--json", help="Write the figures there; - is standard output.")] = "",
 ) -> None:
     """Put blocks into the bowl through a console, record and verify each; ends with 1 when a promise is not kept."""
+    busy = uvloop.run(busy_percent(LOOK_SECONDS))
     try:
         figures = uvloop.run(pick_and_place(Choices(network, times, hand, seed, pictures, keep), _say))
     except ProfileError as error:
@@ -50,10 +55,11 @@ def command(
         _say(str(error) or "the robot does not say that the bowl is empty")
         raise typer.Exit(EXIT_FAILED) from error
     _say(_summary(figures))
+    text = json.dumps(kept_run(busy, [figures]), indent=1) + "\n"
     if json_to == "-":
-        sys.stdout.write(json.dumps(figures) + "\n")
+        sys.stdout.write(text)
     elif json_to:
-        Path(json_to).write_text(json.dumps(figures, indent=1) + "\n")
+        Path(json_to).write_text(text)
     raise typer.Exit(0 if is_kept(figures) else 1)
 
 

@@ -12,7 +12,7 @@ import sys
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -62,6 +62,7 @@ class _Place:
     host: str
     address: str
     cut: Callable[[float], None]  # for seconds
+    silence: Callable[[float, float], float]  # s of the path's own outages between two times
 
     @property
     def log(self) -> Path:
@@ -83,7 +84,9 @@ async def _on_one_path(folder: Path, seed: int) -> AsyncIterator[_Place]:
                 spaces.outage(seconds, robot=robot_link)
 
         robot, outside = partial(spaces.start, "robot"), partial(spaces.start, "operator")
-        yield _Place(folder, robot, outside, outside, OPERATOR_ADDRESS, OPERATOR_ADDRESS, cut)
+        yield _Place(
+            folder, robot, outside, outside, OPERATOR_ADDRESS, OPERATOR_ADDRESS, cut, lambda _began, _ended: 0.0
+        )
 
 
 @asynccontextmanager
@@ -91,7 +94,8 @@ async def _behind_routers(folder: Path, network: str, seed: int) -> AsyncIterato
     """Each behind a router of its own; the robot's path to the console is that of a profile's robot link."""
     async with ThreeSites(load_profile(network), load_profile("perfect"), HTTP_PORT, seed=seed) as sites:
         robot, console, page = (partial(sites.start, site) for site in SITES)
-        yield _Place(folder, robot, console, page, "0.0.0.0", CONSOLE, partial(sites.outage, "robot"))
+        cut, silence = partial(sites.outage, "robot"), partial(sites.planned_silence, "robot")
+        yield _Place(folder, robot, console, page, "0.0.0.0", CONSOLE, cut, silence)
 
 
 async def run_cuts(
@@ -115,7 +119,8 @@ async def run_cuts(
             made = [await _cut(place, seconds, number, say) for number in range(cuts)]
         intentions = [tuple(json.loads(line)) for line in place.intentions.read_text().splitlines()]
         log = list(records(place.log))
-    return [_judged(log, cut, intentions) for cut in made]
+        found = [_judged(log, cut, intentions) for cut in made]
+        return [_with_silence(each, cut, place) for each, cut in zip(found, made, strict=True)]
 
 
 def figures(findings: list[Finding]) -> dict[str, Any]:
@@ -131,6 +136,7 @@ def figures(findings: list[Finding]) -> dict[str, Any]:
         "back_ms_median": _ms(known_backs[len(known_backs) // 2] if known_backs else None),
         "back_ms_worst": _ms(None if None in backs else known_backs[-1]),
         "back_ms": [_ms(back) for back in backs],
+        "own_outage_ms": [_ms(finding.silent_seconds) for finding in findings],
         "oldest_answer_ms": _ms(max(finding.oldest_answer for finding in findings)),
         "oldest_intention_ms": _ms(max(finding.oldest_intention or 0.0 for finding in findings)),
         "max_event_age_ms": _ms(DESCRIPTION.max_event_age),
@@ -217,6 +223,12 @@ def _read_from(log: Path, place: int) -> tuple[list[Record], int]:
         data = lines.read()
     whole = data[: data.rfind(b"\n") + 1]
     return [json.loads(line) for line in whole.splitlines()], place + len(whole)
+
+
+def _with_silence(finding: Finding, cut: Cut, place: _Place) -> Finding:
+    if finding.control_seconds is None:
+        return finding
+    return replace(finding, silent_seconds=place.silence(cut.ended, cut.ended + finding.control_seconds))
 
 
 def _judged(log: list[Record], cut: Cut, intentions: list[Any]) -> Finding:

@@ -1,5 +1,6 @@
 """Outages, in which nothing passes: on a schedule, and on demand. No I/O."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -54,6 +55,21 @@ class Outages:
                 if silence is not None and (found is None or silence.until > found.until):
                     found = silence
         return found
+
+    def planned_seconds(self, began: float, ended: float) -> float:
+        """Return for how long outages of the schedule held between two times; of several at once the sum."""
+        if self._started is None:
+            return 0.0
+        return sum(_overlap(planned, began - self._started, ended - self._started) for planned in self._planned)
+
+
+def _overlap(planned: PlannedOutage, began: float, ended: float) -> float:
+    rounds = [0]
+    if planned.every is not None:
+        first = max(0, math.floor((began - planned.at) / planned.every))
+        rounds = list(range(first, max(first, math.ceil((ended - planned.at) / planned.every)) + 1))
+    starts = [planned.at + number * (planned.every or 0.0) for number in rounds]
+    return sum(max(0.0, min(ended, start + planned.lasts) - max(began, start)) for start in starts)
 
 
 def _holding(planned: PlannedOutage, passed: float, started: float) -> Silence | None:

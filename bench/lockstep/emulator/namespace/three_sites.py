@@ -95,6 +95,10 @@ class ThreeSites(TunSites[Site]):
         """Lose every packet between a site and the console from now on, for `seconds`."""
         self._legs[site].outages.demand(time.monotonic(), seconds)
 
+    def planned_silence(self, site: Literal["robot", "page"], began: float, ended: float) -> float:
+        """Return the seconds of the profile's own outages between two monotonic times."""
+        return self._legs[site].outages.planned_seconds(began, ended)
+
     def sent_bytes(self, site: Site, direction: Direction) -> int:
         """Return the bytes that a site's path to the console has taken in one direction."""
         return self._legs[site].paths[direction].statistics.bytes

@@ -29,6 +29,7 @@ class Finding:
     oldest_intention: float | None  # s from an intention to its execution after the outage, the longest
     max_event_age: float  # s, the most that the two may be
     control_seconds: float | None  # from the network's return to the first command that moves
+    silent_seconds: float = 0.0  # of these, in which the path had an outage of its own
 
     @property
     def rested_within_hold(self) -> bool:
