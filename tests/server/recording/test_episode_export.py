@@ -332,6 +332,24 @@ def test_a_file_of_changes_that_somebody_wrote_makes_no_discarded_episode_count(
     assert [row["lockstep.event"] for row in rows(root)] == [*range(10, 20), *range(45, 60)]
 
 
+def test_a_table_of_kept_episodes_has_no_row_of_another(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    with RecordingReader(path) as reader:
+        add_edit(path, episodes_of(reader), EpisodeEdit(at=1.0, by="x", episode="c", dropped=True))
+    (table,) = export_parquet.export(path, tmp_path / "a.parquet", "", kept=True)
+    found = pq.read_table(table).to_pylist()
+    assert [row["event"] for row in found] == [*range(11, 21)], "without b, d and e, and c was discarded since"
+    (text,) = export_csv.export(path, tmp_path / "a.csv", "", kept=True)
+    with text.open(encoding="utf-8") as file:
+        assert [int(row["event"]) for row in csv.DictReader(file)] == [*range(11, 21)]
+
+
+def test_a_table_of_kept_episodes_is_empty_where_there_are_none(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap")
+    (table,) = export_parquet.export(path, tmp_path / "a.parquet", "", kept=True)
+    assert pq.read_table(table).num_rows == 0
+
+
 def test_tables_and_films_say_of_each_event_which_episode_it_was_driven_in(tmp_path: Path) -> None:
     path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
     with RecordingReader(path) as reader:

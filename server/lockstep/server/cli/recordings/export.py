@@ -26,6 +26,7 @@ __all__ = ["add_export_command"]
 DATASET_TOLERANCE = 4  # events, as the page's own
 EXTRAS = ("wrench", "ranges")
 DATASET = "lerobot: "
+TABLES = (ExportFormat.CSV, ExportFormat.PARQUET)
 
 
 def add_export_command(app: typer.Typer, make_settings: MakeSettings) -> None:
@@ -59,6 +60,9 @@ def add_export_command(app: typer.Typer, make_settings: MakeSettings) -> None:
             bool,
             typer.Option("--whole", help=DATASET + "take each file without episodes as one in any case."),
         ] = False,
+        kept: Annotated[
+            bool, typer.Option("--kept", help="csv, parquet: rows of kept episodes alone, as a dataset has.")
+        ] = False,
         append: Annotated[bool, typer.Option("--append", help=DATASET + "append what the dataset has not.")] = False,
         follow: Annotated[
             bool,
@@ -71,6 +75,8 @@ def add_export_command(app: typer.Typer, make_settings: MakeSettings) -> None:
         """Write recordings in another form; lerobot: the kept episodes of all of them as one dataset."""
         settings = make_settings(state_dir=state_dir)
         paths = [recording_file(file, settings, robot, directory) for file in files or []]
+        if kept and to not in TABLES:
+            raise usage_error("--kept is for csv and parquet; lerobot has kept episodes alone")
         if to is ExportFormat.LEROBOT:
             store = recording_store(settings, robot, directory)
             options = _options(
@@ -91,8 +97,9 @@ def add_export_command(app: typer.Typer, make_settings: MakeSettings) -> None:
             raise usage_error("--out takes one recording at a time, but for lerobot")
         # Loaded only here: what needs no extra takes none.
         exporter: Any = load_extra(f"lockstep.server.recording.export.export_{to.value}", EXTRA_OF.get(to, "export"))
+        only = {"kept": True} if kept else {}
         for path in paths:
-            for each in or_usage(partial(exporter.export, path, out, task)):
+            for each in or_usage(partial(exporter.export, path, out, task, **only)):
                 _say(escaped(each))
 
 

@@ -13,8 +13,12 @@ from lockstep.server.recording.reading.reader import RecordingReader
 __all__ = ["export"]
 
 
-def export(path: Path, out: Path | None, task: str) -> list[Path]:
-    """Write and return the file: `out`, or one beside `path`. Raises RecordingError, OSError."""
+def export(path: Path, out: Path | None, task: str, *, kept: bool = False) -> list[Path]:
+    """Write and return the file: `out`, or one beside `path`. `kept`: rows of kept episodes alone.
+
+    Raises:
+        RecordingError, OSError: it cannot be read or written.
+    """
     target = out or path.with_suffix(".csv")
     with (
         RecordingReader(path) as reader,
@@ -27,7 +31,7 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
         streams = [stream for each in reader.index.topics if (stream := stream_of(each.topic))]
         writer = csv.writer(file)
         writer.writerow(columns_of(description, streams, has_episodes=has_episodes))
-        for row in event_rows(reader, episodes):
+        for row in event_rows(reader, episodes, kept=kept):
             writer.writerow([_cell(value) for value in values_of(row, description, streams, has_episodes=has_episodes)])
     return [target]
 

@@ -19,8 +19,12 @@ ROWS = 10_000  # of a group
 TYPES = {int: pa.int64(), float: pa.float64(), bool: pa.bool_(), str: pa.string()}
 
 
-def export(path: Path, out: Path | None, task: str) -> list[Path]:
-    """Write and return the file: `out`, or one beside `path`. Raises RecordingError, OSError."""
+def export(path: Path, out: Path | None, task: str, *, kept: bool = False) -> list[Path]:
+    """Write and return the file: `out`, or one beside `path`. `kept`: rows of kept episodes alone.
+
+    Raises:
+        RecordingError, OSError: it cannot be read or written.
+    """
     target = out or path.with_suffix(".parquet")
     with RecordingReader(path) as reader:
         description = reader.description()
@@ -32,7 +36,8 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
             (name, TYPES[kind]) for name, kind in columns_of(description, streams, has_episodes=has_episodes).items()
         ]
         schema = pa.schema(fields, metadata=metadata)
-        rows = (values_of(row, description, streams, has_episodes=has_episodes) for row in event_rows(reader, episodes))
+        found = event_rows(reader, episodes, kept=kept)
+        rows = (values_of(row, description, streams, has_episodes=has_episodes) for row in found)
         with unfinished_file(target) as partial, pq.ParquetWriter(partial, schema) as writer:
             while group := list(islice(rows, ROWS)):
                 columns = [list(column) for column in zip(*group, strict=True)]

@@ -35,8 +35,13 @@ class EventRow(NamedTuple):
     episode: EpisodeEntry | None = None  # the episode that it was driven in
 
 
-def event_rows(reader: RecordingReader, episodes: Sequence[EpisodeEntry] = ()) -> Iterator[EventRow]:
-    """Yield the rows in the order of their events. `episodes`: those of the recording. Raises RecordingError."""
+def event_rows(
+    reader: RecordingReader, episodes: Sequence[EpisodeEntry] = (), *, kept: bool = False
+) -> Iterator[EventRow]:
+    """Yield the rows in the order of their events.
+
+    `episodes`: those of the recording. `kept`: those of kept episodes alone. Raises RecordingError.
+    """
     places = EpisodeOfEvent(episodes)
     event = 0
     command: CommandRecord | None = None
@@ -58,6 +63,9 @@ def event_rows(reader: RecordingReader, episodes: Sequence[EpisodeEntry] = ()) -
                 driver = name
             case FeedbackRecord() as feedback if feedback.event != event:
                 event = feedback.event
+                episode = places.of(event)
+                if kept and (episode is None or episode.state != "kept"):
+                    continue
                 became = command if command is not None and command.event == event else None
                 yield EventRow(
                     feedback,
@@ -67,7 +75,7 @@ def event_rows(reader: RecordingReader, episodes: Sequence[EpisodeEntry] = ()) -
                     driver,
                     dict(stamps),
                     drivers.of(feedback),
-                    places.of(event),
+                    episode,
                 )
 
 
