@@ -161,4 +161,6 @@ async def test_a_finger_that_rests_sets_a_goal_and_one_that_moves_moves_the_map(
         await _picture(console, "map-phone-aim")
         await touch("touchEnd")
         await until_logged(stack, "action", lambda record: record["name"] == "go_to")
+        said = console.page.locator(".action-words, .map-words").filter(visible=True, has_text="Go to: ")
+        await expect(said).to_have_count(1)  # not twice, one over the other
         await _picture(console, "map-phone-going")

@@ -207,6 +207,7 @@ export class MapView {
       this.words,
       action !== null && isShown ? actionWords(action, update) : whyNoGoal(engine, description, now),
     );
+    setData(this.words, "says", isShown ? "action" : "hint");
     setData(this.words, "tone", isShown ? actionTone(update) : "off");
     setHidden(this.cancel, running === null || !(holdsSeat(state) || state.welcome?.role === "supervisor"));
     setData(this.element, "aims", String(this.aim !== null));
