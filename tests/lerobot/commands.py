@@ -118,7 +118,9 @@ async def run_lerobot(directory: Path, command: str, *flags: str, link: str = ""
     return text
 
 
-async def run_driving(arm: Arm, directory: Path, command: str, *flags: str, dataset: Path | None = None) -> Stack:
+async def run_driving(
+    arm: Arm, directory: Path, command: str, *flags: str, dataset: Path | None = None, link: str = ""
+) -> Stack:
     """Run a command that drives the arm; return the stack with what the bridge recorded since this run began.
 
     A bridge that the machine has held up beyond its watchdog wants a neutral command, and a refusal ends LeRobot's
@@ -126,6 +128,7 @@ async def run_driving(arm: Arm, directory: Path, command: str, *flags: str, data
 
     Args:
         dataset: what the command writes, and an earlier run may have begun
+        link: an operator's; "": that beside the console
 
     Raises:
         AssertionError: it failed otherwise, or each time.
@@ -133,7 +136,7 @@ async def run_driving(arm: Arm, directory: Path, command: str, *flags: str, data
     for attempt in range(ATTEMPTS):
         here = await arm.stack.from_here()
         try:
-            await run_lerobot(directory, command, *flags, link=arm.stack.operator)
+            await run_lerobot(directory, command, *flags, link=link or arm.stack.operator)
         except AssertionError as error:
             stalls = await here.events("stall")  # by the watchdog, or by the bridge itself if that was held up as well
             if "NotArmed" not in str(error) or not stalls or attempt == ATTEMPTS - 1:

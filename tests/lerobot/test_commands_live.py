@@ -16,6 +16,7 @@ import pytest
 from lockstep.bench.harness.processes import running_process
 from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.client import CommandRefused, Console
+from lockstep.emulator.namespace.network_process import NetworkProcess
 from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python, newest, reach, run_driving, run_lerobot
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(2400)]
@@ -90,6 +91,23 @@ async def test_record_makes_a_dataset_whose_pictures_are_of_its_states_and_repla
         assert console.feedback.at_rest
 
 
+async def test_record_across_the_hong_kong_network_has_pictures_of_its_states(arm: Arm, tmp_path: Path) -> None:
+    folder = tmp_path / "far"
+    async with NetworkProcess("hong-kong") as network:
+        await network.open_console(arm.stack.console)
+        network.begin()
+        await run_driving(
+            *(arm, tmp_path, "lerobot-record", "--robot.type=lockstep", *LEADER, f"--teleop.steps={STEPS}"),
+            *(*PATIENT, *dataset_flags(tmp_path, "far", 1)),
+            dataset=folder,
+            link=network.link(arm.stack.operator),
+        )
+    states, pictures = np.array(rows(folder)["observation.state"])[:, 0], np.array(greys(folder))
+    assert len(states) == len(pictures) > 5
+    assert np.ptp(states) > 5.0
+    assert np.abs(pictures - GREY - states).max() < NEAR
+
+
 async def test_teleoperate_drives_and_leaves_the_arm_at_rest(arm: Arm, tmp_path: Path) -> None:
     async with Console(arm.stack.observer, audio=False, video=False) as watching:
         places: list[float] = []
@@ -158,12 +176,42 @@ async def test_a_stopped_robot_is_not_driven_and_the_command_says_why(arm: Arm, 
         )
 
 
+async def test_a_console_that_is_lost_ends_the_command_which_says_why_and_the_arm_rests(
+    arm: Arm, tmp_path: Path
+) -> None:
+    ended = asyncio.Event()
+
+    async def lose() -> None:
+        await _driven(arm)
+        with arm.stack.frozen_console():
+            await ended.wait()
+
+    async with asyncio.TaskGroup() as tasks:
+        tasks.create_task(lose())
+        try:
+            with pytest.raises(AssertionError, match="ConsoleLost"):
+                await run_lerobot(
+                    *(tmp_path, "lerobot-teleoperate", "--robot.type=lockstep", *LEADER, *PATIENT),
+                    *("--fps=15", "--teleop_time_s=300"),
+                    link=arm.stack.operator,
+                )
+        finally:
+            ended.set()
+    executed, rests = await arm.stack.events("executed"), await arm.stack.events("at_rest")
+    assert rests[-1]["time"] > executed[-1]["time"], "it came to rest by itself"
+
+
+async def _driven(arm: Arm) -> None:
+    """Until the arm has moved."""
+    async with Console(arm.stack.observer, audio=False, video=False) as watching:
+        async for feedback in watching.feedbacks():
+            if abs(feedback.axes[0] - 10.0) > 2.0:
+                return
+
+
 async def test_a_bridge_that_its_machine_held_up_ends_the_command_which_says_why(arm: Arm, tmp_path: Path) -> None:
     async def hold_up() -> None:
-        async with Console(arm.stack.observer, audio=False, video=False) as watching:
-            async for feedback in watching.feedbacks():
-                if abs(feedback.axes[0] - 10.0) > 2.0:  # it is driven
-                    break
+        await _driven(arm)
         with arm.stack.frozen_bridge():
             await asyncio.sleep(HELD_UP)
 

@@ -64,7 +64,7 @@ async def _answered(page: Page, act: Any) -> dict[str, Any]:
     return found
 
 
-async def test_recorded_discarded_relabelled_trimmed_split_and_exported_the_rows_match(
+async def test_recorded_discarded_relabelled_trimmed_split_merged_and_exported_the_rows_match(
     tmp_path: Path, chromium: Browser
 ) -> None:
     recordings = tmp_path / "recordings"
@@ -94,7 +94,7 @@ async def test_recorded_discarded_relabelled_trimmed_split_and_exported_the_rows
     with RecordingReader(path) as reader:
         first = reader.index.episodes[0]
     assert [first.task, first.outcome] == ["push the box", "success"], "the recording is as it was"
-    assert len(read_edits(path)) == 6
+    assert len(read_edits(path)) == 8
     (root,) = export_lerobot.export_all([path], tmp_path / "dataset", "")
     table = pq.read_table(root / "data/chunk-000/file-000.parquet").to_pylist()
     begin, behind, middle = first.first_event + 2, first.last_event - 3, first.first_event + 6
@@ -146,7 +146,14 @@ async def _split(page: Page) -> None:
     assert [each["id"] for each in split["episodes"][:2]] == ["edit-5a", "edit-5b"]
     await expect(editor.locator(".editor-history")).to_contain_text("split at event")
     await _shot(page, "split")
+    merged = await _answered(page, editor.get_by_role("button", name="Merge with the next").click())
+    whole, halves = merged["episodes"][0], split["episodes"][:2]
+    assert (whole["first_event"], whole["last_event"]) == (halves[0]["first_event"], halves[1]["last_event"])
+    assert len(merged["episodes"]) == len(split["episodes"]) - 1
+    await _shot(page, "merged")
     await editor.get_by_role("button", name="Close").click()
+    again = await _answered(page, page.locator(".undo-bar").get_by_role("button", name="Undo").click())
+    assert again["episodes"][:2] == halves
 
 
 def _folder(directory: Path) -> Path:

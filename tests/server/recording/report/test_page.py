@@ -4,6 +4,7 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
+import msgspec
 import pytest
 from typer.testing import CliRunner
 
@@ -16,10 +17,14 @@ from lockstep.server.recording.format.topics import CAMERA
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.report.dataset_page import dataset_page
 from lockstep.server.recording.report.page import session_page
+from lockstep.server.recording.report.session import read_session
 from lockstep.server.recording.report.totals import Totals
 from lockstep.server.recording.writing.writer import Entry
-from tests.server.recording.makers import DESCRIPTION, EPOCH, INTERVAL, START, Story, own_entry, rewritten
+from tests.server.recording.makers import DESCRIPTION, EPOCH, INFO, INTERVAL, START, Story, own_entry, rewritten
 from tests.server.recording.test_episode_export import KEPT_AND_NOT, recording
+
+OTHER_EPOCH = "ffee"
+LATER = 60 * 1_000_000_000  # ns
 
 
 class _Checked(HTMLParser):
@@ -61,6 +66,42 @@ def refusal(event: int, detail: str = "") -> Entry:
         epoch=EPOCH, event=event, refused=event + 1, reason="late", detail=detail, by="robot", name="Ada"
     )
     return own_entry(record, _at(event))
+
+
+def parts(folder: Path) -> tuple[Path, Path]:
+    """A session whose robot's bridge was restarted: two files, of another epoch each."""
+    first = recording(folder / "s.mcap", refusal(30), events=50)
+    info = msgspec.structs.replace(INFO, part=2, epoch=OTHER_EPOCH, episodes="none")
+    later = [each._replace(arrived=each.arrived + LATER, captured=each.captured + LATER) for each in _again()]
+    return first, rewritten(folder / "s-p2.mcap", later, lambda each: [each], info=info)
+
+
+def _again() -> list[Entry]:
+    return sorted([*Story(events=40, real=True).entries(), refusal(20, "again")], key=lambda each: each.arrived)
+
+
+def test_a_session_of_several_files_is_told_as_one(tmp_path: Path) -> None:
+    first, second = parts(tmp_path)
+    text = session_page(first)
+    assert len(checked(text).sources) == 3, "of the refusal in each file, and of when pictures came again"
+    assert re.search(r"none of front for 5\d\.\d s", text)
+    plain = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", text))
+    assert " 88 events, 88 commands, 264 pictures and sounds. In 2 files." in plain
+    assert " 61.6 s, " in plain, "from the begin of the first to the end of the last"
+    assert "late 2 " in plain
+    assert "In 2 files" not in session_page(second), "a later part by itself"
+    assert "In 2 files" not in session_page(first, alone=True)
+    assert read_session(first).seconds == pytest.approx(61.6, abs=0.1)
+
+
+def test_a_part_that_cannot_be_read_is_named_and_a_file_of_another_session_is_none(tmp_path: Path) -> None:
+    first, second = parts(tmp_path)
+    other = msgspec.structs.replace(INFO, recording="another", part=3)
+    rewritten(tmp_path / "s-p3.mcap", Story(events=10, real=True).entries(), lambda each: [each], info=other)
+    second.write_bytes(b"\x89MCAP0\r\n" + bytes(90))
+    text = session_page(first)
+    assert "Not read: s-p2.mcap." in text
+    assert "In 2 files" not in text
 
 
 def test_a_session_is_told_by_driver_and_camera_with_pictures_of_what_was_wrong(tmp_path: Path) -> None:

@@ -85,7 +85,7 @@ class Worker:
     def _report(self, path: Path) -> Answer:
         from lockstep.server.recording.report.page import session_page
 
-        return "done", session_page(path).encode()
+        return "done", session_page(path, alone=True).encode()  # others may be large, or still be written
 
 
 def serve(source: BinaryIO, out: BinaryIO) -> None:

@@ -12,6 +12,7 @@ from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.topics import CAMERA, stream_of
 from lockstep.server.recording.reading.picture_at import picture_at
 from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.reading.session_parts import SessionParts, session_parts
 from lockstep.server.recording.recording_store import entry_of
 from lockstep.server.recording.report import page_parts as parts
 from lockstep.server.recording.report.driver_figures import DriverTally
@@ -49,25 +50,33 @@ class SessionFacts(NamedTuple):
     pictures: dict[int, list[str]]  # HTML, by the place of the moment
 
 
-def session_page(recording: Path, figures: Sequence[Figure] = ()) -> str:
+def session_page(recording: Path, figures: Sequence[Figure] = (), *, alone: bool = False) -> str:
     """Return the page of a recording, with further figures at its end.
+
+    It is that of the whole session if the recording is its first part, and not `alone`.
 
     Raises:
         RecordingError, OSError: the recording cannot be read.
     """
-    facts = _facts(recording)
-    verdict = verify_file(recording)
+    files, unread = SessionParts([recording], []) if alone else session_parts(recording)
+    facts = _facts(files)
+    verdicts = [verify_file(each) for each in files]
     totals = facts.totals
     at = datetime.fromtimestamp(facts.began / 1e6, UTC)
+    events, commands, media = (
+        sum(getattr(each, name) for each in verdicts) for name in ("events", "commands", "pictures_and_sounds")
+    )
     lead = (
-        f"{facts.robot}, {at:%Y-%m-%d %H:%M:%S} UTC, {facts.seconds:.1f} s, {verdict.events} events, "
-        f"{verdict.commands} commands, {verdict.pictures_and_sounds} pictures and sounds."
+        f"{facts.robot}, {at:%Y-%m-%d %H:%M:%S} UTC, {facts.seconds:.1f} s, {events} events, "
+        f"{commands} commands, {media} pictures and sounds."
+        + (f" In {len(files)} files." if len(files) > 1 else "")
+        + (f" Not read: {', '.join(unread)}." if unread else "")
     )
     sections = [
         parts.section(
             "overview", "Overview", _overview(facts), timeline_svg(facts.episodes, totals, facts.began, facts.seconds)
         ),
-        _promises(verdict),
+        _promises(verdicts),
         parts.section("drivers", "Drivers", _drivers(totals)),
         policies_section(facts.tally),
         parts.section("cameras", "Cameras", _cameras(totals)),
@@ -81,34 +90,45 @@ def session_page(recording: Path, figures: Sequence[Figure] = ()) -> str:
     return parts.page(facts.title, lead, sections)
 
 
-def _facts(path: Path) -> SessionFacts:
-    with RecordingReader(path) as reader:
-        index = reader.index
+def _facts(files: Sequence[Path]) -> SessionFacts:
+    with RecordingReader(files[0]) as reader:
+        info, began, ended = reader.info, reader.index.started, reader.index.ended
         totals, tally = Totals(reader.description()), DriverTally()
-        for number in range(len(index.chunks)):
+    episodes: list[ListedEpisode] = []
+    pictures: dict[int, list[str]] = {}
+    for path in files:
+        shown = len(totals.moments)
+        with RecordingReader(path) as reader:
+            totals.next_part()
+            _count(reader, totals, tally)
+            ended = reader.index.ended
             try:
-                for record in reader.chunk(number):
-                    arrived = record.arrived // 1000
-                    if record.topic.startswith(CAMERA):
-                        keyframe, captured = record.keyframe, record.captured // 1000
-                        totals.picture(stream_of(record.topic), record.event, arrived, captured, keyframe=keyframe)
-                        continue
-                    own = own_record_of(record.schema, record.data)
-                    if own is not None:
-                        totals.own(own, arrived)
-                        tally.take(own)
-            except RecordingError:
-                continue  # the check of what is promised says so
-        totals.end(index.ended)
+                edits = read_edits(path)
+            except OSError:
+                edits = []
+            episodes += listed_episodes(entry_of(path, reader.info, reader.index), reader.index, edits).episodes
+            mine = range(shown, min(len(totals.moments), MAX_SHOWN))
+            pictures |= {at: _pictures(reader, totals.moments[at]) for at in mine}
+    totals.end(ended)
+    seconds = (ended - began) / 1e6
+    return SessionFacts(info.name or files[0].stem, info.robot, began, seconds, totals, tally, episodes, pictures)
+
+
+def _count(reader: RecordingReader, totals: Totals, tally: DriverTally) -> None:
+    for number in range(len(reader.index.chunks)):
         try:
-            edits = read_edits(path)
-        except OSError:
-            edits = []
-        listed = listed_episodes(entry_of(path, reader.info, index), index, edits)
-        pictures = {at: _pictures(reader, moment) for at, moment in enumerate(totals.moments[:MAX_SHOWN])}
-        title = reader.info.name or path.stem
-        seconds = (index.ended - index.started) / 1e6
-        return SessionFacts(title, reader.info.robot, index.started, seconds, totals, tally, listed.episodes, pictures)
+            for record in reader.chunk(number):
+                arrived = record.arrived // 1000
+                if record.topic.startswith(CAMERA):
+                    keyframe, captured = record.keyframe, record.captured // 1000
+                    totals.picture(stream_of(record.topic), record.event, arrived, captured, keyframe=keyframe)
+                    continue
+                own = own_record_of(record.schema, record.data)
+                if own is not None:
+                    totals.own(own, arrived)
+                    tally.take(own)
+        except RecordingError:
+            continue  # the check of what is promised says so
 
 
 def _pictures(reader: RecordingReader, moment: Moment) -> list[str]:
@@ -156,13 +176,20 @@ def _rate(facts: SessionFacts) -> float | None:
     return count * 60 / driven if driven else None
 
 
-def _promises(verdict: Verdict) -> str:
-    rows = "".join(
-        f"<tr><th scope='row' class='left'>{name.replace('_', ' ')}</th><td>{check.looked or ''}</td>"
-        f"<td><span class='{'good' if check.ok else 'bad'}'>"
-        f"{'kept' if check.ok else f'{check.count} times not'}</span></td></tr>"
-        for name, check in verdict.checks.items()
-    )
+def _promises(verdicts: Sequence[Verdict]) -> str:
+    rows = ""
+    for name in verdicts[0].checks:
+        checks = [each.checks[name] for each in verdicts]
+        looked, count, is_kept = (
+            sum(each.looked for each in checks),
+            sum(each.count for each in checks),
+            all(each.ok for each in checks),
+        )
+        rows += (
+            f"<tr><th scope='row' class='left'>{name.replace('_', ' ')}</th><td>{looked or ''}</td>"
+            f"<td><span class='{'good' if is_kept else 'bad'}'>"
+            f"{'kept' if is_kept else f'{count} times not'}</span></td></tr>"
+        )
     names = ("<th scope='col' class='left'>promise</th>", "<th scope='col'>looked at</th>", "<th scope='col'></th>")
     head = f"<thead><tr>{''.join(names)}</tr></thead>"
     return parts.section("promises", "Promises", f"<table class='plain'>{head}<tbody>{rows}</tbody></table>")

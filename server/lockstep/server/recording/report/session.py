@@ -13,6 +13,7 @@ from lockstep.server.recording.reading.bookmarks import Mark
 from lockstep.server.recording.reading.command_delays import CommandDelays
 from lockstep.server.recording.reading.event_rows import EventRow, event_rows
 from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.reading.session_parts import session_parts
 from lockstep.server.recording.report.traced_events import MOST_STREAMS, TracedEvents
 
 __all__ = ["Series", "Session", "Shown", "read_session"]
@@ -64,40 +65,49 @@ class Session:
 
 
 def read_session(path: Path) -> Session:
-    """Read a recording.
+    """Read a recording, with all parts of the session if it is the first.
 
     Raises:
         RecordingError, OSError: it cannot be read.
     """
-    with RecordingReader(path) as reader:
-        index = reader.index
-        origin = index.started * 1000
+    first, *others = session_parts(path).files
+    with RecordingReader(first) as reader:
         session = Session(
             info=reader.info,
             description=reader.description(),
-            seconds=(index.ended - index.started) / 1e6,
-            marks=index.marks,
-            began=index.started,
+            seconds=0.0,
+            marks=[],
+            began=reader.index.started,
         )
-        for row in event_rows(reader):
-            _take_row(session, row, (row.captured - origin) / SECOND)
-        delays = CommandDelays()
-        for record in reader.records():
-            stream = stream_of(record.topic)
-            if stream:
-                shown = session.streams.setdefault(stream, Shown())
-                shown.captured.add((record.captured - origin) / SECOND, record.event)
-                continue
-            at = (record.arrived - origin) / SECOND
-            own = own_record_of(record.schema, record.data)
-            if (delay := delays.take(own, record.arrived)) is not None:
-                session.answered.add(at, delay)
-            match own:
-                case TraceRecord() as trace:
-                    session.traced.add(trace, at)
-                case ReportRecord() as report:
-                    _take_report(session, report, at)
-        return session
+        _take_part(session, reader)
+    for other in others:
+        with RecordingReader(other) as reader:
+            _take_part(session, reader)
+    return session
+
+
+def _take_part(session: Session, reader: RecordingReader) -> None:
+    origin = session.began * 1000
+    session.seconds = (reader.index.ended - session.began) / 1e6
+    session.marks.extend(reader.index.marks)
+    for row in event_rows(reader):
+        _take_row(session, row, (row.captured - origin) / SECOND)
+    delays = CommandDelays()
+    for record in reader.records():
+        stream = stream_of(record.topic)
+        if stream:
+            shown = session.streams.setdefault(stream, Shown())
+            shown.captured.add((record.captured - origin) / SECOND, record.event)
+            continue
+        at = (record.arrived - origin) / SECOND
+        own = own_record_of(record.schema, record.data)
+        if (delay := delays.take(own, record.arrived)) is not None:
+            session.answered.add(at, delay)
+        match own:
+            case TraceRecord() as trace:
+                session.traced.add(trace, at)
+            case ReportRecord() as report:
+                _take_report(session, report, at)
 
 
 def _take_row(session: Session, row: EventRow, at: float) -> None:

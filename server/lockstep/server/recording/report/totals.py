@@ -3,6 +3,7 @@
 Show `Totals` every record in the order of the file.
 """
 
+import math
 from dataclasses import dataclass, field
 
 from lockstep.protocol.description import RobotDescription
@@ -137,6 +138,10 @@ class Totals:
                 self._link = record.link
             case ReportRecord():
                 self._report(record)
+
+    def next_part(self) -> None:
+        """What follows is of another file, whose robot's clock may have begun anew."""
+        self._time = math.inf
 
     def end(self, at: int) -> None:
         """The session ends at `at`, in µs."""
