@@ -22,9 +22,9 @@ PICTURE_WORDS: Final = (  # in a camera's frame: x right and y down in its pictu
     ("x", "right"),
     ("y", "down"),
     ("z", "away"),
-    ("rx", "nose up"),
-    ("ry", "nose right"),
-    ("rz", "turn clockwise"),
+    ("rx", "pitch up"),
+    ("ry", "yaw right"),
+    ("rz", "roll clockwise"),
 )
 HALF_A_TURN: Final = round(math.pi, 5)
 STOPS_IN: Final = 0.15  # s from an axis' full speed to a standstill, when it brakes

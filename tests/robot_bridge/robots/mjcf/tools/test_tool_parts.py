@@ -187,7 +187,7 @@ def test_a_stick_moves_a_tool_in_a_cameras_frame_right_and_up_in_the_picture() -
     parts, axes = parts_in(arm_model(more=SEEN))
     assert [axis.label for axis in axes[-6:]] == [
         *("Grip right", "Grip down", "Grip away"),
-        *("Grip nose up", "Grip nose right", "Grip turn clockwise"),
+        *("Grip pitch up", "Grip yaw right", "Grip roll clockwise"),
     ]
     keys = {(each.axis, each.key_positive, each.key_negative) for each in parts.layer.bindings}
     assert {("grip.x", "KeyD", "KeyA"), ("grip.y", "KeyS", "KeyW"), ("grip.z", "KeyR", "KeyF")} <= keys
