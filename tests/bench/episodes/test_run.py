@@ -1,7 +1,9 @@
 """A few short episodes through everything real: MuJoCo, bridge, console, people and a policy, dataset, pixels."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -11,6 +13,7 @@ from typer.testing import CliRunner
 from lockstep.bench.episodes.cli import app
 from lockstep.bench.episodes.pixels import look
 from lockstep.robot_bridge.robots.so101.model_source import FOLDER_VARIABLE
+from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from tests.robot_bridge.robots.so101.driver import MODEL_FOLDER
 
 FEW = ["--times", "3", "--discard", "1", "--redo", "1", "--no-pictures"]
@@ -43,19 +46,29 @@ def test_a_dataset_of_people_and_a_policy_has_the_kept_episodes_alone_and_each_p
     assert (dataset["unreadable"], dataset["outside"], dataset["mislabelled"]) == (0, 0, 0)
     root = tmp_path / "dataset"
     assert look(root).ok
-    _shift_events(root)
+    verdict = verify_dataset(root, pixels=True)
+    assert verdict.ok
+    assert verdict.checks["shown"].looked == dataset["pictures"]
+    _shift(root, "lockstep.stamp", lambda stamps: [stamp - 1 for stamp in stamps])
+    verdict = verify_dataset(root, pixels=True)
+    assert verdict.checks["aligned"].ok, "the stamps alone are as they should be"
+    assert verdict.checks["shown"].count == dataset["pictures"]
+    assert not look(root).ok
+    _shift(root, "lockstep.stamp", lambda stamps: [stamp + 1 for stamp in stamps])
+    assert look(root).ok
+    _shift(root, "lockstep.event", lambda event: event + 10)
     seen = look(root)
     assert not seen.ok
     assert seen.outside == seen.pictures
 
 
-def _shift_events(root: Path) -> None:
-    """Say of each row that it is of an event ten later."""
+def _shift(root: Path, column: str, how: Callable[[Any], Any]) -> None:
+    """Say something else of each row."""
     [path] = (root / "data").rglob("*.parquet")
     table = pq.read_table(path)
-    place = table.schema.get_field_index("lockstep.event")
-    events = pa.array([event + 10 for event in table.column(place).to_pylist()], pa.int64())
-    pq.write_table(table.set_column(place, "lockstep.event", events), path)
+    place = table.schema.get_field_index(column)
+    values = pa.array([how(value) for value in table.column(place).to_pylist()], table.schema.field(place).type)
+    pq.write_table(table.set_column(place, table.schema.field(place), values), path)
 
 
 @pytest.mark.timeout(600)
@@ -67,6 +80,20 @@ def test_a_console_that_is_killed_while_it_keeps_an_episode_leaves_a_dataset_of_
     [fault] = figures["faults"]
     assert fault["ok"]
     assert 1 <= fault["kept"] <= fault["in_dataset"] <= 2
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.usefixtures("arm")
+def test_faults_among_the_episodes_leave_a_dataset_of_the_kept_ones() -> None:
+    faults = ["--fault", "kill-open", "--fault", "kill-robot"]
+    few = ["--times", "2", "--discard", "0", "--redo", "1", "--no-pictures"]
+    done = CliRunner().invoke(app, [*few, "--among-episodes", *faults, "--json", "-"])
+    assert done.exit_code == 0, done.output
+    [figures] = json.loads(done.stdout)["runs"]
+    assert [(each["fault"], each["ok"]) for each in figures["faults"]] == [("kill-open", True), ("kill-robot", True)]
+    assert "lost" in " ".join(figures["faults"][1]["said"])
+    assert (figures["kept"], figures["in_dataset"]) == (2, 2)
+    assert min(each["rows"] for each in figures["runs"]) > 5
 
 
 def test_more_discarded_and_redone_episodes_than_there_are_is_an_error() -> None:

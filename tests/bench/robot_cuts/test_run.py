@@ -2,8 +2,8 @@
 
 import pytest
 
-from lockstep.bench.experiment.judge.outage_judge import Finding
-from lockstep.bench.robot_cuts.run import Way, figures, run_cuts
+from lockstep.bench.experiment.judge.outage_judge import Cut, Finding
+from lockstep.bench.robot_cuts.run import Way, figures, run_cuts, with_silence
 from lockstep.emulator.errors import NamespacesUnavailable
 from lockstep.emulator.namespace.namespaces import ROBOT_ADDRESS
 from lockstep.emulator.namespace.tun import open_tun
@@ -27,6 +27,14 @@ def test_a_robot_that_never_rested_or_came_back_has_no_worst_figure() -> None:
     found = figures([finding(), finding(rest_seconds=None, control_seconds=None)])
     assert (found["rest_ms_worst"], found["back_ms_worst"]) == (None, None)
     assert (found["rested_within_hold"], found["back_within_2_s"]) == (1, 1)
+
+
+def test_outages_of_the_path_s_own_until_control_is_back_are_told() -> None:
+    cut = Cut(100.0, 110.0, held=False)
+    found = with_silence(finding(control_seconds=0.8), cut, lambda began, ended: round(ended - began, 6) / 2)
+    assert figures([found])["own_outage_ms"] == [400.0]
+    never = finding(control_seconds=None)
+    assert with_silence(never, cut, lambda _began, _ended: 1.0) == never
 
 
 CUT = 2.0  # s

@@ -9,6 +9,7 @@ import pytest
 from playwright.async_api import Browser, Locator, expect
 
 from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.pad import START
 from lockstep.client import CommandRefused, Console
 from tests.client.live.test_policies import policy_link
 from tests.e2e.accessibility import findings
@@ -80,6 +81,11 @@ async def test_a_person_lets_a_policy_drive_and_takes_over_by_button_key_and_pad
             await _policy_drives(ada)
             await ada.page.keyboard.press(press)
             await ada.until("s.seat.mine && !s.armed && s.at_rest === true")
+        await ada.page.keyboard.press("F2")
+        await _policy_drives(ada)
+        for pressed in (True, False):
+            await ada.pad.press(START, pressed)
+        await ada.until("s.seat.mine && !s.armed && s.at_rest === true")
         await ada.arm()
         await ada.drive_forward()
         await expect(ada.page.get_by_label("What shadow policies want")).to_contain_text("net")

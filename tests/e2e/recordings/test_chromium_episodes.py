@@ -62,9 +62,9 @@ async def test_a_supervisor_begins_and_keeps_episodes_with_keys_and_pad_while_an
         await expect(bar.locator(".episode-count")).to_have_text("1 kept")
         await page.keyboard.press("b")
         await expect(bar.locator(".episode-words")).to_contain_text("Take 2")
-        await bar.get_by_role("button", name="Redo").click()
+        await page.keyboard.press("o")  # again
         await expect(bar.locator(".episode-words")).to_contain_text("Take 3")
-        await bar.get_by_role("button", name="Discard").click()
+        await page.keyboard.press("l")
         await expect(bar.locator(".episode-count")).to_have_text("1 kept · 2 discarded")
         await expect(bar.locator(".episode-words")).to_have_text("Episode 3 is discarded")
         await page_console.pad.press(RIGHT_STICK, True)
@@ -100,6 +100,35 @@ async def test_a_supervisor_begins_and_keeps_episodes_with_keys_and_pad_while_an
             ("cut", "", "push the box b k l"),
         ]
         assert [text for _, text in reader.index.episodes[3].marks] == ["mark"]
+
+
+async def test_keys_and_the_button_keep_fail_and_mark_an_episode(tmp_path: Path, chromium: Browser) -> None:
+    recordings = tmp_path / "recordings"
+    async with (
+        running_stack(
+            tmp_path, settings={"LOCKSTEP_EPISODES__COUNTDOWN_SECONDS": "0"}, extra=("--record", str(recordings))
+        ) as stack,
+        open_console(chromium, stack.operator) as console,
+    ):
+        await console.until_live()
+        bar, keys = console.page.locator(".episode-bar"), console.page.keyboard
+        await bar.locator(".episode-task").fill("push the box")
+        await bar.locator(".episode-task").press("Enter")
+        for number, key in enumerate("kny", 1):
+            await expect(bar.locator(".episode-words")).to_contain_text(f"Take {number}")
+            if key == "k":
+                await keys.press("m")
+            elif key == "y":
+                await bar.get_by_role("button", name="Mark").click()
+            await keys.press(key)
+            await expect(bar.locator(".episode-count")).to_have_text(f"{number} kept")
+            await keys.press("b")
+        await keys.press("l")
+    (path,) = recordings.glob("*.mcap")
+    with RecordingReader(path) as reader:
+        episodes = reader.index.episodes[:3]
+    assert [each.outcome for each in episodes] == ["", "failure", "success"]
+    assert [[text for _, text in each.marks] for each in episodes] == [["mark"], [], ["mark"]]
 
 
 async def test_an_observer_sees_no_bar_and_without_a_recording_there_is_none(tmp_path: Path, chromium: Browser) -> None:

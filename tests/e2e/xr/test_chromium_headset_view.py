@@ -1,6 +1,9 @@
 """What both eyes see in an emulated headset: the gate's pictures and none else, veils, a stereo pair, AR."""
 
+import os
+import re
 from collections.abc import AsyncIterator, Sequence
+from pathlib import Path
 
 import pytest
 import pytest_asyncio
@@ -36,6 +39,12 @@ def _far(one: Sequence[float], other: Sequence[float]) -> float:
     return max(abs(left - right) for left, right in zip(one[:3], other[:3], strict=True))
 
 
+async def _picture(headset: Headset, name: str) -> None:
+    """Both eyes, for a person who wants to look at them."""
+    if folder := os.environ.get("LOCKSTEP_TEST_PICTURES"):
+        await headset.page.screenshot(path=Path(folder) / f"{name}.png")
+
+
 @pytest_asyncio.fixture(loop_scope="session")
 async def posed(half_rate: None, tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Stack]:
     async with running_stack(tmp_path_factory.mktemp("posed"), robot="tests.e2e.posed_arm:PosedArm") as stack:
@@ -52,8 +61,10 @@ async def test_a_picture_that_the_page_veils_is_veiled_for_both_eyes_and_nothing
         shown = await headset.page.evaluate(MEAN, "overview")
         for eye in (LEFT_EYE, RIGHT_EYE):
             assert _far(await _seen(headset, eye), shown) < NEAR
+        await _picture(headset, "headset-vr")
         with own_stack.frozen_console():
             await console.until("s.headset.panels.every((panel) => panel.veil !== null)")
+            await _picture(headset, "headset-veiled")
             veiled = [await _seen(headset, eye) for eye in (LEFT_EYE, RIGHT_EYE)]
             veils = [panel["veil"] for panel in (await console.stats())["headset"]["panels"]]
         words = "No picture", "Not connected", "Robot unreachable"
@@ -72,9 +83,12 @@ async def test_no_frame_of_a_session_shows_a_picture_out_of_tolerance_without_it
         await headset.enter()
         await headset.page.evaluate("testHeadset.watch('overview')")
         await headset.drive()
-        await headset.drive_until("testHeadset.watched.length > 30 && s.event > 40")
+        await headset.drive_until(
+            "testHeadset.watched.length > 30 && s.event > 40 && testHeadset.watched.some(({ gap }) => gap > 1)"
+        )
         watched = await headset.page.evaluate("testHeadset.watched")
         stale = [each for each in watched if each["gap"] > 1]
+        assert stale
         assert [each for each in stale if each["veil"] is None] == []
         assert (await console.stats())["streams"]["overview"]["violations"] == 0
 
@@ -91,6 +105,7 @@ async def test_a_pair_of_cameras_is_seen_by_an_eye_each(posed: Stack, chromium: 
         for eye, own, other in ((LEFT_EYE, left, right), (RIGHT_EYE, right, left)):
             seen = await _seen(headset, eye)
             assert _far(seen, own) < _far(seen, other)
+        await _picture(headset, "headset-stereo")
 
 
 async def test_in_ar_the_room_is_seen_beside_the_panels_and_the_view_can_be_recentred(
@@ -101,6 +116,7 @@ async def test_in_ar_the_room_is_seen_beside_the_panels_and_the_view_can_be_rece
         assert (await headset.console.stats())["headset"]["mode"] == "immersive-ar"
         assert (await _seen(headset, ABOVE))[3] == 0
         assert (await _seen(headset, LEFT_EYE))[3] == 255
+        await _picture(headset, "headset-ar")
         await headset.look(2.5)
         assert (await _seen(headset, LEFT_EYE))[3] == 0  # the panels stay where they are
         await headset.press("right", "thumbstick")
@@ -108,7 +124,7 @@ async def test_in_ar_the_room_is_seen_beside_the_panels_and_the_view_can_be_rece
         assert (await _seen(headset, LEFT_EYE))[3] == 255
 
 
-async def test_the_view_says_where_the_time_goes(stack: Stack, chromium: Browser) -> None:
+async def test_the_view_says_event_gap_delay_and_force_and_where_the_time_goes(stack: Stack, chromium: Browser) -> None:
     async with open_headset(chromium, stack.operator) as headset:
         await headset.enter()
         await headset.drive()
@@ -120,3 +136,10 @@ async def test_the_view_says_where_the_time_goes(stack: Stack, chromium: Browser
         statistics = (await headset.console.stats())["headset"]
         assert statistics["way"]["Headset"] > 0
         assert statistics["frame_ms"] > 0
+        await headset.console.until("s.headset.figures.Delay !== '– ms'")
+        figures = (await headset.console.stats())["headset"]["figures"]
+        assert int(figures["Event"]) > 1
+        assert re.fullmatch(r"\d+ of \d+", figures["Gap"])
+        assert re.fullmatch(r"[\d.]+ ms", figures["Delay"])
+        assert re.fullmatch(r"\d+\.\d N", figures["Force"])
+        await _picture(headset, "headset-driving")

@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from lockstep.protocol.description import BodyTwist, PlanarBase, Pose, RobotDescription, StartWarning
+from lockstep.protocol.description import BodyTwist, Camera, PlanarBase, Pose, RobotDescription, StartWarning
 from lockstep.robot_bridge.description.check_axes import check_braking
 from lockstep.robot_bridge.description.check_description import check_description
 from lockstep.robot_bridge.errors import DescriptionError
@@ -14,6 +14,7 @@ from tests.robot_bridge.control.goals.goal_helpers import ARM_AXES, SHOULDER, TU
 
 ARM = HangingArm().describe()
 TOOL = ARM.poses[0]
+EYE = Camera(name="tool", label="Tool", width=64, height=48, frame_rate=1)  # named like a body
 
 
 def changed(**fields: Any) -> RobotDescription:
@@ -102,6 +103,10 @@ def test_each_axis_has_to_be_at_rest_by_the_last_tick_within_hold(
         (with_pose(name=""), "pose name '' is empty or used twice"),
         (with_pose(body="arm"), "pose tool names the body 'arm', which is not described"),
         (with_pose(body=""), "pose tool names the body ''"),
+        (
+            msgspec.structs.replace(with_pose(frame="tool"), cameras=(EYE,)),
+            "pose tool names the frame 'tool', which is a body and a camera",
+        ),
         (with_pose(frame="eye"), "pose tool names the frame 'eye', which is no body and no camera"),
         (with_pose(settling=-0.1), "axis x: settling of its pose must be from 0 to less than hold"),
         (with_pose(settling=math.nan), "axis x: settling of its pose must be from 0 to less than hold"),

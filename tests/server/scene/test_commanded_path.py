@@ -1,7 +1,9 @@
 """Where commands alone would have brought a robot, against motions that are known by hand."""
 
 import math
+from typing import Any
 
+import msgspec
 import pytest
 
 from lockstep.protocol.description import (
@@ -10,6 +12,8 @@ from lockstep.protocol.description import (
     Body,
     BodyJoint,
     BodyTwist,
+    Camera,
+    CameraCalibration,
     Joint,
     PlanarBase,
     Pose,
@@ -217,6 +221,37 @@ def _at(
     path.command(2, values)
     tool = [1.5, 0.0, 0.0, 0.0, 0.0, 0.0]
     _fed(path, 2, 1.0, axes, axes=[*axes, *tool], goals=[*goals, *tool], **rest)
+
+
+def seen_by(camera: str, **calibration: Any) -> RobotDescription:
+    """The arm, whose tool's goals are in the frame of the camera "eye"."""
+    view = CameraCalibration(fx=1, fy=1, cx=0, cy=0, **calibration)
+    eye = Camera(name="eye", label="Eye", width=64, height=48, frame_rate=1, calibration=view)
+    poses = (msgspec.structs.replace(ARM.poses[0], frame=camera),)
+    return msgspec.structs.replace(ARM, poses=poses, cameras=(eye,))
+
+
+@pytest.mark.parametrize("length", [1.0, 2.0])
+def test_a_tool_is_drawn_where_its_goal_is_in_the_frame_of_a_camera_on_a_body_that_moves(length: float) -> None:
+    half = length * math.sqrt(0.5)
+    path = CommandedPath(seen_by("eye", body="lift", position=(0.0, 0.0, 2.0), orientation=(half, half, 0.0, 0.0)))
+    tool = [1.5, 0.0, 0.0, 0.0, 0.0, 0.0]
+    path.command(2, [None, None, 0.9, 0.3, 0.4, 0.0, 0.0, 0.0])
+    _fed(path, 2, 1.0, [0.0, 0.5], axes=[0.0, 0.5, *tool], goals=[0.0, 0.5, *tool])
+    poses = path.poses()
+    assert poses is not None
+    # A quarter of a turn about x: the camera's y is the world's z, its z looks along the world's -y.
+    assert poses["tool"].position == pytest.approx((0.4, -0.4, 0.5 + 2.0 + 0.3))
+
+
+def test_a_tool_whose_camera_hangs_on_no_known_body_stays_where_it_was_measured() -> None:
+    path = CommandedPath(seen_by("eye", body="roof", orientation=(1.0, 0.0, 0.0, 0.0)))
+    tool = [1.5, 0.0, 0.0, 0.0, 0.0, 0.0]
+    path.command(2, [None, None, 0.9, 0.3, 0.4, 0.0, 0.0, 0.0])
+    _fed(path, 2, 1.0, [0.0, 0.5], axes=[0.0, 0.5, *tool], goals=[0.0, 0.5, *tool])
+    poses = path.poses()
+    assert poses is not None
+    assert poses["tool"].position == pytest.approx((1.0, 0.0, 0.5))
 
 
 def test_a_goal_axis_is_drawn_where_its_newest_command_wants_it_within_its_range() -> None:

@@ -13,6 +13,7 @@ export interface HeadsetStatistics {
   readonly text: string;
   readonly reset: string | null; // what the button says that resets a stop; null: it is not there
   readonly pointed: Readonly<Record<"left" | "right", string | null>>; // button that the hand points at
+  readonly figures: Readonly<Record<string, string>>; // as the view shows them: "Gap" is "0 of 4"
   readonly way: Readonly<Record<string, number>>; // ms of each stretch from the camera to the eye: "Capture"
   readonly battery: number | null; // 0 to 1; null: not known
 }

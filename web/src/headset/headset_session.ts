@@ -122,6 +122,9 @@ export class HeadsetSession {
       text: this.status?.text ?? "",
       reset: this.reset?.text ?? null,
       pointed: { left: this.buttonAt("left"), right: this.buttonAt("right") },
+      figures: Object.fromEntries(
+        (this.status?.figures ?? []).map(({ label, value, unit }) => [label, `${value} ${unit}`.trim()]),
+      ),
       way: Object.fromEntries((this.status?.way ?? []).map(({ name, ms }) => [name, ms])),
       battery: this.battery.level,
     };

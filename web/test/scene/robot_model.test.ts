@@ -1,9 +1,10 @@
-import { ArrowHelper, type BufferGeometry, LineSegments } from "three";
+import { ArrowHelper, AxesHelper, type BufferGeometry, LineSegments } from "three";
 import { describe, expect, test } from "vitest";
 import { addAnnotations, type SceneState } from "../../src/scene/robot_annotations";
 import { RobotModel } from "../../src/scene/robot_model";
 import { shapeOf } from "../../src/scene/robot_shapes";
 import type { Body, RobotDescription } from "../../src/protocol/wire";
+import { goalAxisOf } from "../messages";
 import { readVectors } from "../vectors";
 
 interface Poses {
@@ -128,4 +129,32 @@ test("rays end where the sensors saw something within their range", () => {
   const positions = geometry?.getAttribute("position").array ?? [];
   expect([...positions].slice(0, 6)).toEqual([0, 0, 0, 1, 0, 0]);
   expect(positions[10]).toBeCloseTo(2, 5);
+});
+
+test("a tool's frame stands where it was measured, and its goal's where that is known and somewhere else", () => {
+  const names = ["x", "y", "z", "rx", "ry", "rz"] as const;
+  const described = {
+    ...robot({ bodies: [body("hand", "", { position: [1, 0, 0] })] }),
+    axes: names.map((name) => goalAxisOf(name)),
+    poses: [
+      {
+        ...{ name: "tool", label: "Tool", body: "hand", frame: "", point: [0, 0, 0.1], instead_of: [], settling: 0 },
+        ...{ position: ["x", "y", "z"], rotation: ["rx", "ry", "rz"] },
+      },
+    ],
+  } as RobotDescription;
+  const model = new RobotModel(described);
+  const signs = addAnnotations(model, described, 1);
+  const frames = model.root.children.filter((each) => each instanceof AxesHelper);
+  const shown = (goals: SceneState["goals"]): unknown[] => {
+    for (const sign of signs) sign.show({ ...STILL, goals });
+    return frames.map((each) => (each.visible ? each.position.toArray() : null));
+  };
+  expect(frames).toHaveLength(2);
+  expect(shown([0.2, 0.3, 0.4, 0, 0, 0])).toEqual([
+    [1, 0, 0.1],
+    [0.2, 0.3, 0.4],
+  ]);
+  expect(shown([1, 0, 0.1, 0, 0, 0])).toEqual([[1, 0, 0.1], null]); // it is there
+  expect(shown([null, 0.3, 0.4, 0, 0, 0])).toEqual([[1, 0, 0.1], null]); // nobody knows
 });

@@ -38,12 +38,13 @@ def command(
     redo: Annotated[int, typer.Option(min=0, help="How many of them are done again.")] = 4,
     fault: Annotated[
         list[str] | None,
-        typer.Option(
-            help=f"Try this fault instead, without a network; all, or one of {', '.join(FAULTS)}. May repeat."
-        ),
+        typer.Option(help=f"Try this fault instead, by itself; all, or one of {', '.join(FAULTS)}. May repeat."),
     ] = None,
     among: Annotated[
-        bool, typer.Option("--among-episodes", help="The faults strike among the episodes, through the network.")
+        bool,
+        typer.Option(
+            "--among-episodes", help="The faults strike among the planned episodes; all of them unless named."
+        ),
     ] = False,
     seed: Annotated[int, typer.Option(help="Of the network, and of what becomes of which episode.")] = 1,
     pictures: Annotated[bool, typer.Option(help="The drivers receive the pictures of both cameras.")] = True,

@@ -5,7 +5,6 @@ The dataset is made afterwards, and must have the kept episodes alone, whole.
 
 import asyncio
 import secrets
-import signal
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from typing import Any, Final
@@ -13,7 +12,7 @@ from typing import Any, Final
 from lockstep.bench.episodes.dataset import export, judged
 from lockstep.bench.episodes.faults import DISK_FAULTS, ROBOT, FaultName, FaultRun, meet, settings_of
 from lockstep.bench.episodes.session import drivers
-from lockstep.bench.episodes.small_disk import small_disk
+from lockstep.bench.episodes.small_disk import cancel_on_sigterm, small_disk
 from lockstep.bench.harness.stack import running_bridge, running_console
 from lockstep.client import ConsoleLost
 
@@ -29,9 +28,7 @@ async def run_fault(fault: FaultName, say: Callable[[str], None]) -> dict[str, A
     Raises:
         ProcessFailed, ConsoleError, TimeoutError: a part did not start, or was lost before the fault.
     """
-    task = asyncio.current_task()
-    if task is not None:  # a terminated run leaves no mounted disk either
-        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
+    cancel_on_sigterm()
     async with _running(fault) as run:
         await run.keep_one()
         await meet(run)

@@ -1,4 +1,4 @@
-"""The planned episodes through the network, with a fault after every few of them.
+"""The planned episodes, through a network if one is given, with a fault after every few of them.
 
 Each fault strikes in an episode of its own, beside the planned ones. Then robot, network, console and drivers begin
 anew in the same folder, as people do after a crash. The dataset of the whole day must have exactly what was kept.
@@ -17,20 +17,20 @@ from lockstep.bench.episodes.faults import DISK_FAULTS, ROBOT, FaultName, FaultR
 from lockstep.bench.episodes.plan import DRIVERS, Planned, plan
 from lockstep.bench.episodes.run import Choices, figures_of, keep_files, links_of
 from lockstep.bench.episodes.session import Done, Session, drivers
-from lockstep.bench.episodes.small_disk import small_disk
+from lockstep.bench.episodes.small_disk import cancel_on_sigterm, small_disk
 from lockstep.bench.experiment.choices import media_of
 from lockstep.bench.experiment.stage import running_stage
 from lockstep.bench.pick_place.run import recorder_of
 from lockstep.emulator.impairment.profile import load_profile
 
-__all__ = ["record_faulted_day", "shares"]
+__all__ = ["Day", "record_faulted_day", "shares"]
 
 NO_NETWORK: Final = "perfect"
 DISK_BYTES: Final = 1 << 30  # for the recordings of a whole day
 
 
 @dataclass
-class _Day:
+class Day:
     """What has become of the day until now.
 
     Attributes:
@@ -66,8 +66,9 @@ async def record_faulted_day(
     Raises:
         ProcessFailed, ConsoleError, TimeoutError: a part did not start, or was lost other than by a fault.
     """
+    cancel_on_sigterm()
     planned = plan(choices.times, choices.discard, choices.redo, choices.seed)
-    day = _Day()
+    day = Day()
     with TemporaryDirectory(prefix="lockstep-bench-") as directory, ExitStack() as stack:
         folder = Path(directory)
         recordings, root = folder / "recordings", folder / "dataset"
@@ -79,7 +80,7 @@ async def record_faulted_day(
         files = sorted(recordings.glob("*.mcap"))
         said = await export(files, root)
         dataset = {"wrong": [f"export: {said}"]} if said else await judged(root, day.told)
-        if dataset["wrong"] and day.perhaps and not said:
+        if dataset["wrong"] and day.perhaps and not said:  # of one at most, which kill-keeping leaves open
             dataset = await judged(root, day.kept)
         await asyncio.to_thread(keep_files, choices.keep, files, root)
     figures = figures_of(choices, day.done, dataset)
@@ -97,7 +98,7 @@ async def _until_fault(
     fault: FaultName,
     planned: Sequence[Planned],
     folder: Path,
-    day: _Day,
+    day: Day,
     say: Callable[[str], None],
     *,
     seed: int,

@@ -13,14 +13,17 @@ from pathlib import Path
 from typing import Any, Final
 
 import av
+import numpy as np
+import numpy.typing as npt
 import pyarrow.parquet as pq
 
 from lockstep.bench.episodes.turns import Span
-from lockstep.robot_bridge.robots.event_strip import read_event_strip
 
-__all__ = ["Pixels", "look"]
+__all__ = ["Pixels", "look", "strip_event"]
 
 LISTED: Final = 20  # of what is wrong
+BLACK: Final = 90  # luma; a cell between black and white cannot be read
+WHITE: Final = 160
 MODULUS: Final = 1 << 31  # event references are serial numbers of 31 bits
 
 
@@ -109,7 +112,23 @@ def _drawn(root: Path, camera: str) -> Iterator[int | None]:
     for path in sorted((root / "videos" / camera).rglob("*.mp4")):
         with av.open(str(path)) as video:
             for picture in video.decode(video=0):
-                yield read_event_strip(picture.to_ndarray(format="gray"))
+                yield strip_event(picture.to_ndarray(format="gray"))
+
+
+def strip_event(luma: npt.NDArray[np.uint8]) -> int | None:
+    """Return the event in the strip over the top of a picture, shape (H, W); None: it cannot be read.
+
+    The strip is the top twentieth: 32 cells of equal width, white for 1, of which the last makes the number of ones
+    even.
+    """
+    height, width = luma.shape
+    rows = height // 20
+    band = luma[rows // 4 : rows - rows // 4]
+    cells = [float(band[:, (4 * at + 1) * width // 128 : (4 * at + 3) * width // 128].mean()) for at in range(32)]
+    if any(BLACK <= cell <= WHITE for cell in cells):
+        return None
+    bits = "".join("1" if cell > WHITE else "0" for cell in cells)
+    return (int(bits[:31], 2) or None) if bits.count("1") % 2 == 0 else None
 
 
 def _spans(rows: list[dict[str, Any]]) -> list[Span]:

@@ -1,11 +1,20 @@
 """A disk that is soon full."""
 
+import asyncio
+import signal
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["small_disk"]
+__all__ = ["cancel_on_sigterm", "small_disk"]
+
+
+def cancel_on_sigterm() -> None:
+    """Let SIGTERM cancel the present task, so that a terminated run leaves no mounted disk either."""
+    task = asyncio.current_task()
+    if task is not None:
+        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
 
 
 @contextmanager

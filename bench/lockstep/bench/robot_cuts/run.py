@@ -32,7 +32,7 @@ from lockstep.emulator.namespace.three_sites import CONSOLE, SITES, ThreeSites
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 from lockstep.server.http.transport.tls import self_signed
 
-__all__ = ["RETURN_SECONDS", "Way", "figures", "run_cuts"]
+__all__ = ["RETURN_SECONDS", "Way", "figures", "run_cuts", "with_silence"]
 
 # The console connects to the robot, the robot to the console, or that with each of robot, console and operator behind a
 # router of its own.
@@ -120,7 +120,7 @@ async def run_cuts(
         intentions = [tuple(json.loads(line)) for line in place.intentions.read_text().splitlines()]
         log = list(records(place.log))
         found = [_judged(log, cut, intentions) for cut in made]
-        return [_with_silence(each, cut, place) for each, cut in zip(found, made, strict=True)]
+        return [with_silence(each, cut, place.silence) for each, cut in zip(found, made, strict=True)]
 
 
 def figures(findings: list[Finding]) -> dict[str, Any]:
@@ -225,10 +225,11 @@ def _read_from(log: Path, place: int) -> tuple[list[Record], int]:
     return [json.loads(line) for line in whole.splitlines()], place + len(whole)
 
 
-def _with_silence(finding: Finding, cut: Cut, place: _Place) -> Finding:
+def with_silence(finding: Finding, cut: Cut, silence: Callable[[float, float], float]) -> Finding:
+    """Return the finding with the path's own outages. `silence`: s of them between two times."""
     if finding.control_seconds is None:
         return finding
-    return replace(finding, silent_seconds=place.silence(cut.ended, cut.ended + finding.control_seconds))
+    return replace(finding, silent_seconds=silence(cut.ended, cut.ended + finding.control_seconds))
 
 
 def _judged(log: list[Record], cut: Cut, intentions: list[Any]) -> Finding:

@@ -115,6 +115,8 @@ def _check_poses(description: RobotDescription, goals: dict[str, Axis]) -> None:
             raise DescriptionError(f"{where} names the body {pose.body!r}, which is not described")
         if pose.frame not in frames:
             raise DescriptionError(f"{where} names the frame {pose.frame!r}, which is no body and no camera")
+        if pose.frame and pose.frame in known and any(camera.name == pose.frame for camera in description.cameras):
+            raise DescriptionError(f"{where} names the frame {pose.frame!r}, which is a body and a camera")
         if not all(map(math.isfinite, pose.point)):
             raise DescriptionError(f"{where}: its point must be finite")
         _check_pose_axes(where, pose, goals, used)

@@ -118,10 +118,7 @@ class CommandedPath:
         for twist in self._twists:
             if twist.body in poses:
                 poses[twist.body] = _moved_body(twist, before, poses, spans)
-        for pose in self._poses:
-            if any(name in goals for name in (*pose.position, *pose.rotation)):
-                frame = frame_pose(self._description, pose.frame, poses) or STILL
-                poses[pose.body] = _body_at(pose, frame, poses[pose.body], goals)
+        self._put_tools(poses, goals)
         return poses
 
     def wanted(self, values: Sequence[float | None]) -> dict[str, Pose] | None:
@@ -138,11 +135,15 @@ class CommandedPath:
         goals = self._goals_of(newest, values)
         joints = dict(zip(self._joints, newest.joints, strict=False))
         poses = world_poses(self._description, joints | self._joints_at(goals, joints))
-        for pose in self._poses:
-            if any(name in goals for name in (*pose.position, *pose.rotation)):
-                frame = frame_pose(self._description, pose.frame, poses) or STILL
-                poses[pose.body] = _body_at(pose, frame, poses[pose.body], goals)
+        self._put_tools(poses, goals)
         return poses
+
+    def _put_tools(self, poses: dict[str, Pose], goals: Mapping[str, _Goal]) -> None:
+        """Put the bodies of tools where their goals are, as far as that is known."""
+        for pose in self._poses:
+            frame = frame_pose(self._description, pose.frame, poses)
+            if frame is not None and any(name in goals for name in (*pose.position, *pose.rotation)):
+                poses[pose.body] = _body_at(pose, frame, poses[pose.body], goals)
 
     def _spans(self) -> list[_Span]:
         """Return the commands between each feedback and the next."""

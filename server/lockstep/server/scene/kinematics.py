@@ -54,7 +54,11 @@ def frame_pose(description: RobotDescription, name: str, bodies: Mapping[str, Po
     if view is None:
         return None
     body = bodies.get(view.body) if view.body else STILL
-    return None if body is None else joined(body, Pose(view.position, view.orientation))
+    length = math.hypot(*view.orientation)
+    if body is None or not 0.0 < length < math.inf:
+        return None
+    w, x, y, z = view.orientation
+    return joined(body, Pose(view.position, (w / length, x / length, y / length, z / length)))
 
 
 def scene_paths(description: RobotDescription) -> dict[str, str]:

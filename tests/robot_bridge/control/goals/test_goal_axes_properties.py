@@ -50,6 +50,7 @@ class GoalLife(RuleBasedStateMachine):
         self.executed: list[int] = []
         self.sent: list[Command] = []
         self.seen: list[Feedback] = []
+        self.issued_at: dict[tuple[int, int], float] = {}  # by issue and nonce of the feedback
         self.reads: set[int] = set()  # axes whose goals may be read anew in the next tick
         self.was_cut = False
         self.moved = 0  # commands that move, executed
@@ -120,9 +121,12 @@ class GoalLife(RuleBasedStateMachine):
         self.deliver(data.draw(st.sampled_from(self.sent[-8:])))
 
     def deliver(self, command: Command) -> None:
+        was_needed = self.core.interlock.needed
         outcome = self.core.command(command, self.now)
         if not isinstance(outcome, Executed):
             return
+        assert self.now - self.issued_at[command.issue, command.nonce] <= AGE, "it is late"
+        assert not (was_needed and self.core.values.moves(outcome.values)), "it moves before a neutral command"
         assert outcome.event not in self.executed, "executed twice"
         self.executed.append(outcome.event)
         measured = self.robot.measured_axes()
@@ -191,7 +195,7 @@ class GoalLife(RuleBasedStateMachine):
         for gap in gaps:
             self.tick(gap)
 
-    @rule(gap=st.floats(0.01, 0.5))
+    @rule(gap=st.floats(0.01, 0.5) | st.floats(AGE / 2, 2 * AGE))
     def a_tick_comes_late(self, gap: float) -> None:
         self.tick(gap)
 
@@ -231,6 +235,7 @@ class GoalLife(RuleBasedStateMachine):
     def issue(self) -> None:
         measured = self.robot.measure()._replace(at_rest=self.shaper.at_rest)
         self.seen.append(self.core.issue(measured, self.now, goals=self.shaper.goals))
+        self.issued_at[self.seen[-1].issue, self.seen[-1].nonce] = self.now
 
 
 GoalLife.TestCase.settings = settings(max_examples=100, stateful_step_count=50, deadline=None)

@@ -79,6 +79,7 @@ def test_a_tool_in_a_cameras_frame_is_where_the_camera_sees_it(tmp_path: Path) -
         (FRAME, "", "arm.tool.frame: there is no camera 'front'"),
         (FRAME, CAMERA.split(", calibration")[0] + "}\n", "the camera 'front' needs a calibration"),
         (FRAME, CAMERA.replace("position:", "body: forearm, position:"), "a joint moves forearm against the world"),
+        (FRAME, CAMERA.replace("[0.5, -0.5, 0.5, -0.5]", "[0, 0, 0, 0]"), "is not a rotation"),
         (FRAME.replace("front", "upper_arm"), CAMERA.replace("front", "upper_arm"), "is the name of a body too"),
         ("  tool: {tip: hand}\n", "", "arm.tool.tip: hand does not hang on the world"),
         ("  tool: {tip: upper_arm}\n", "", "between upper_arm and the world are 2 joints of the arm; a pose needs 3"),

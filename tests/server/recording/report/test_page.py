@@ -8,12 +8,14 @@ import msgspec
 import pytest
 from typer.testing import CliRunner
 
+from lockstep.protocol.description import Camera
 from lockstep.server.cli.main import app
 from lockstep.server.recording.episodes.edits import EpisodeEdit, add_edit
 from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.export.lerobot_rows import episodes_of
-from lockstep.server.recording.format.records import Degraded, RefusalRecord, SeatRecord
+from lockstep.server.recording.format.records import Degraded, RefusalRecord, RobotRecord, SeatRecord
 from lockstep.server.recording.format.topics import CAMERA
+from lockstep.server.recording.reading import session_parts
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.report.dataset_page import dataset_page
 from lockstep.server.recording.report.page import session_page
@@ -94,13 +96,54 @@ def test_a_session_of_several_files_is_told_as_one(tmp_path: Path) -> None:
     assert read_session(first).seconds == pytest.approx(61.6, abs=0.1)
 
 
+def test_a_part_of_another_robot_is_told_by_its_own_description(tmp_path: Path) -> None:
+    first, second = parts(tmp_path)
+    slow = Camera(name="slow", label="Slow", width=64, height=48, frame_rate=0.5)
+    turned = msgspec.structs.replace(
+        DESCRIPTION, axes=tuple(reversed(DESCRIPTION.axes)), cameras=(*DESCRIPTION.cameras, slow)
+    )
+    info = msgspec.structs.replace(INFO, part=2, epoch=OTHER_EPOCH, episodes="none")
+    later = [each._replace(arrived=each.arrived + LATER, captured=each.captured + LATER) for each in _again()]
+    pictures = [each._replace(topic=f"{CAMERA}slow") for each in later if each.topic == f"{CAMERA}front"]
+    every = sorted([*later, *pictures[:: len(pictures) // 2]], key=lambda each: each.arrived)
+    plain = read_session(first)
+    second.unlink()
+
+    def described(entry: Entry) -> list[Entry]:
+        if not isinstance(entry.record, RobotRecord):
+            return [entry]
+        record = msgspec.structs.replace(entry.record, description=turned)
+        return [own_entry(record, entry.arrived, entry.captured)]
+
+    rewritten(second, every, described, turned, info)
+    session = read_session(first)
+    assert [axis.name for axis in session.description.axes] == ["base.vx", "base.wz"]
+    at = len(session.measured["base.vx"].values) - 10
+    assert session.measured["base.vx"].values[at] == plain.measured["base.wz"].values[at]
+    text = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", session_page(first)))
+    assert re.search(r"slow \d+ [\d.]+ 0\.5 0 ", text), "its own rate is promised, and it was never silent"
+    assert re.search(r"front \d+ 25\.0 25\.0 1 5\d\.\d 0 0 ", text), "no picture is of an event of the file before"
+
+
+def test_a_file_that_is_too_large_with_the_others_or_still_written_is_told_by_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, second = parts(tmp_path)
+    monkeypatch.setattr(session_parts, "MOST_BYTES", first.stat().st_size + 1)
+    (words,) = session_parts.session_parts(first).left_out
+    assert words == f"{second.name} is told by itself, since all together are too large"
+    monkeypatch.undo()
+    monkeypatch.setattr(session_parts, "is_written", lambda path: path == second)
+    assert session_parts.session_parts(first) == ([first], [f"{second.name} is still being written"])
+
+
 def test_a_part_that_cannot_be_read_is_named_and_a_file_of_another_session_is_none(tmp_path: Path) -> None:
     first, second = parts(tmp_path)
     other = msgspec.structs.replace(INFO, recording="another", part=3)
     rewritten(tmp_path / "s-p3.mcap", Story(events=10, real=True).entries(), lambda each: [each], info=other)
     second.write_bytes(b"\x89MCAP0\r\n" + bytes(90))
     text = session_page(first)
-    assert "Not read: s-p2.mcap." in text
+    assert "Without the rest: s-p2.mcap cannot be read." in text
     assert "In 2 files" not in text
 
 

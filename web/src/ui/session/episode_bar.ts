@@ -93,6 +93,7 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
       (each) => isOpen(each) || each.phase === "countdown",
     ),
     make("Redo", "O, pad: R3 with L3", { do: "redo" }, isOpen),
+    make("Mark", "M, pad: R3 with up on the cross", { do: "mark" }, isOpen),
   ];
   const group = h("div", "episode-buttons", { role: "group", "aria-label": "Episode" });
   group.append(...buttons.map((each) => each.element));

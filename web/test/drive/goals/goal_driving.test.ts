@@ -56,6 +56,25 @@ describe("goal axes", () => {
     expect(takeAt(driving, inputsOf(heldOf([])), 20)).toEqual(REST);
   });
 
+  it("are moved on by a touch stick, as far as it is pushed and the way its binding says", () => {
+    const touched: ControlLayer = {
+      ...layer,
+      bindings: [
+        { ...binding, axis: "elbow", touch: "left_y", key_positive: "", key_negative: "" },
+        { ...binding, axis: "wrist", touch: "right_x", invert_touch: true, key_positive: "", key_negative: "" },
+      ],
+    };
+    const driving = new GoalDriving();
+    const touch = { left_x: 0, left_y: 1, right_x: 0.5, right_y: 0 };
+    const inputs = inputsOf({ ...heldOf([]), touch }, { layer: touched });
+    const take = (now: number): readonly AxisValue[] =>
+      driving.take(axisValues(axes, touched, inputs.held, inputs.share), inputs, now);
+    expect(take(0)).toEqual([0, 1.05, -1]);
+    const [, elbow, wrist] = take(100);
+    expect(elbow).toBeCloseTo(1.15); // 1 rad/s
+    expect(wrist).toBeCloseTo(-1.1); // half of 2 rad/s, turned round
+  });
+
   it("ask for no more speed than the hand does", () => {
     const driving = new GoalDriving();
     takeAt(driving, inputsOf(heldOf(["KeyE"])), 0);

@@ -148,7 +148,7 @@ def _view(name: str, bodies: Sequence[Body], cameras: Cameras, base: str) -> Vie
         raise SettingsPlace(where, f"{name!r} is the name of a body too")
     try:
         return view_from(bodies, base, found.body, found.position, found.orientation)
-    except NoChain as error:
+    except ValueError as error:  # no chain, or no rotation
         raise SettingsPlace(where, str(error)) from error
 
 

@@ -26,7 +26,10 @@ class ToolPlace(NamedTuple):
 
 
 def tool_pose(name: str, label: str, body: str, axes: ToolAxes, joints: Sequence[str], frame: str = "") -> Pose:
-    """Return the pose for the description. `joints`: the goal axes of the joints. `frame`: a body; "": the world."""
+    """Return the pose for the description.
+
+    `joints`: the goal axes of the joints. `frame`: a body or camera; "": the world.
+    """
     x, y, z, rx, ry, rz = axes.names
     return Pose(
         name=name,

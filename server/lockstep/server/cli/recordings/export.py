@@ -61,7 +61,7 @@ def add_export_command(app: typer.Typer, make_settings: MakeSettings) -> None:
             typer.Option("--whole", help=DATASET + "take each file without episodes as one in any case."),
         ] = False,
         kept: Annotated[
-            bool, typer.Option("--kept", help="csv, parquet: rows of kept episodes alone, as a dataset has.")
+            bool, typer.Option("--kept", help="csv, parquet: without the rows of no kept episode.")
         ] = False,
         append: Annotated[bool, typer.Option("--append", help=DATASET + "append what the dataset has not.")] = False,
         follow: Annotated[

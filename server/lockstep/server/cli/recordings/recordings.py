@@ -215,6 +215,9 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         out: Annotated[
             Path | None, typer.Option("--out", "--html", help="HTML file to write; unset: beside the recording.")
         ] = None,
+        alone: Annotated[
+            bool, typer.Option("--alone", help="This file alone, not all files of the session that it begins.")
+        ] = False,
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
@@ -228,7 +231,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
             return
         path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
         reporter: Any = load_extra("lockstep.server.recording.report.report", "report")  # needs matplotlib
-        written = or_usage(lambda: reporter.write_report(path, out or path.with_suffix(".html")))
+        written = or_usage(lambda: reporter.write_report(path, out or path.with_suffix(".html"), alone=alone))
         sys.stdout.write(f"{escaped(written)}\n")
 
 

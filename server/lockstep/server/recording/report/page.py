@@ -58,7 +58,7 @@ def session_page(recording: Path, figures: Sequence[Figure] = (), *, alone: bool
     Raises:
         RecordingError, OSError: the recording cannot be read.
     """
-    files, unread = SessionParts([recording], []) if alone else session_parts(recording)
+    files, left_out = SessionParts([recording], []) if alone else session_parts(recording)
     facts = _facts(files)
     verdicts = [verify_file(each) for each in files]
     totals = facts.totals
@@ -70,7 +70,7 @@ def session_page(recording: Path, figures: Sequence[Figure] = (), *, alone: bool
         f"{facts.robot}, {at:%Y-%m-%d %H:%M:%S} UTC, {facts.seconds:.1f} s, {events} events, "
         f"{commands} commands, {media} pictures and sounds."
         + (f" In {len(files)} files." if len(files) > 1 else "")
-        + (f" Not read: {', '.join(unread)}." if unread else "")
+        + (f" Without the rest: {'; '.join(left_out)}." if left_out else "")
     )
     sections = [
         parts.section(
@@ -93,13 +93,15 @@ def session_page(recording: Path, figures: Sequence[Figure] = (), *, alone: bool
 def _facts(files: Sequence[Path]) -> SessionFacts:
     with RecordingReader(files[0]) as reader:
         info, began, ended = reader.info, reader.index.started, reader.index.ended
-        totals, tally = Totals(reader.description()), DriverTally()
+        totals, tally = Totals(), DriverTally()
+    epoch = ""
     episodes: list[ListedEpisode] = []
     pictures: dict[int, list[str]] = {}
     for path in files:
         shown = len(totals.moments)
         with RecordingReader(path) as reader:
-            totals.next_part()
+            totals.next_part(reader.description(), goes_on=reader.info.epoch == epoch)
+            epoch = reader.info.epoch
             _count(reader, totals, tally)
             ended = reader.index.ended
             try:

@@ -1,10 +1,15 @@
 """Reads a recorded session as series over time. Times in s since its beginning, on the recording's clock."""
 
 import math
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import msgspec
+
 from lockstep.protocol.description import Axis, RobotDescription
+from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.records import ReportRecord, TraceRecord
@@ -64,13 +69,15 @@ class Session:
     traced: TracedEvents = field(default_factory=TracedEvents)  # where the time of each event went
 
 
-def read_session(path: Path) -> Session:
-    """Read a recording, with all parts of the session if it is the first.
+def read_session(path: Path, *, alone: bool = False) -> Session:
+    """Read a recording, with all parts of the session if it is the first and not `alone`.
+
+    What is damaged in a later part is left out.
 
     Raises:
         RecordingError, OSError: it cannot be read.
     """
-    first, *others = session_parts(path).files
+    first, *others = [path] if alone else session_parts(path).files
     with RecordingReader(first) as reader:
         session = Session(
             info=reader.info,
@@ -81,17 +88,21 @@ def read_session(path: Path) -> Session:
         )
         _take_part(session, reader)
     for other in others:
-        with RecordingReader(other) as reader:
+        with suppress(RecordingError), RecordingReader(other) as reader:  # the check of the promises tells it
             _take_part(session, reader)
     return session
 
 
 def _take_part(session: Session, reader: RecordingReader) -> None:
-    origin = session.began * 1000
+    origin, axes = session.began * 1000, reader.description().axes
+    known = {axis.name for axis in session.description.axes}
+    session.description = msgspec.structs.replace(
+        session.description, axes=(*session.description.axes, *(axis for axis in axes if axis.name not in known))
+    )
     session.seconds = (reader.index.ended - session.began) / 1e6
     session.marks.extend(reader.index.marks)
     for row in event_rows(reader):
-        _take_row(session, row, (row.captured - origin) / SECOND)
+        _take_row(session, row, (row.captured - origin) / SECOND, axes)
     delays = CommandDelays()
     for record in reader.records():
         stream = stream_of(record.topic)
@@ -110,14 +121,15 @@ def _take_part(session: Session, reader: RecordingReader) -> None:
                 _take_report(session, report, at)
 
 
-def _take_row(session: Session, row: EventRow, at: float) -> None:
+def _take_row(session: Session, row: EventRow, at: float, described: Sequence[Axis]) -> None:
+    """`described`: the axes of the file that has the row."""
     feedback, command = row.feedback, row.command
     session.robot.add(at, feedback.event)
     if len(feedback.wrench) >= 3:
         session.force.add(at, math.hypot(*feedback.wrench[:3]))
-    for axis, value in zip(session.description.axes, feedback.axes, strict=False):
+    axes = list(zip(described, feedback.axes, strict=False))
+    for axis, value in axes:
         session.measured.setdefault(axis.name, Series()).add(at, value)
-    axes = list(zip(session.description.axes, feedback.axes, strict=False))
     for (axis, measured), asked in zip(axes, [] if command is None else command.values, strict=False):
         value = math.nan if asked is None else _beside(axis, measured, asked)
         session.commanded.setdefault(axis.name, Series()).add(at, value)

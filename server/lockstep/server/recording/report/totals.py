@@ -3,7 +3,6 @@
 Show `Totals` every record in the order of the file.
 """
 
-import math
 from dataclasses import dataclass, field
 
 from lockstep.protocol.description import RobotDescription
@@ -77,7 +76,7 @@ class Totals:
     moments: the first ones
     """
 
-    def __init__(self, description: RobotDescription | None) -> None:
+    def __init__(self, description: RobotDescription | None = None) -> None:
         self.drivers: dict[str, DriverTotals] = {}
         self.cameras: dict[str, CameraTotals] = {}
         self.moments: list[Moment] = []
@@ -139,9 +138,14 @@ class Totals:
             case ReportRecord():
                 self._report(record)
 
-    def next_part(self) -> None:
-        """What follows is of another file, whose robot's clock may have begun anew."""
-        self._time = math.inf
+    def next_part(self, description: RobotDescription, *, goes_on: bool) -> None:
+        """Take what follows, of another file. `goes_on`: with the events of the file before."""
+        self._rates |= {each.name: each.frame_rate for each in description.cameras}
+        for name, rate in self._rates.items():
+            if name in self.cameras:
+                self.cameras[name].promised = rate
+        if not goes_on:
+            self._event, self._time, self._delays = 0, 0.0, CommandDelays()
 
     def end(self, at: int) -> None:
         """The session ends at `at`, in µs."""

@@ -189,11 +189,17 @@ def test_a_stick_moves_a_tool_in_a_cameras_frame_right_and_up_in_the_picture() -
         *("Grip right", "Grip down", "Grip away"),
         *("Grip pitch up", "Grip yaw right", "Grip roll clockwise"),
     ]
-    keys = {(each.axis, each.key_positive, each.key_negative) for each in parts.layer.bindings}
-    assert {("grip.x", "KeyD", "KeyA"), ("grip.y", "KeyS", "KeyW"), ("grip.z", "KeyR", "KeyF")} <= keys
+    keys = {each.axis: (each.key_positive, each.key_negative) for each in parts.layer.bindings}
+    assert [keys[f"grip.{word}"] for word in WORDS] == [
+        *(("KeyD", "KeyA"), ("KeyS", "KeyW"), ("KeyR", "KeyF")),
+        *(("ArrowUp", "ArrowDown"), ("ArrowRight", "ArrowLeft"), ("KeyE", "KeyQ")),
+    ]
+    # A pad gives right and down as positive, a touch stick right and up.
     sticks = {each.axis: (each.pad, each.invert_pad, each.invert_touch) for each in parts.layer.bindings}
-    assert sticks["grip.x"] == ("left_x", False, False)  # right is positive, of pads and touch sticks
-    assert sticks["grip.y"] == ("left_y", False, True)  # a pad gives down as positive, a touch stick up
+    assert [sticks[f"grip.{word}"] for word in WORDS] == [
+        *(("left_x", False, False), ("left_y", False, True), ("right_y", True, False)),
+        *(("dpad_y", True, False), ("dpad_x", False, False), ("right_x", False, False)),
+    ]
 
 
 def test_a_camera_on_a_base_that_moves_has_the_pose_of_an_arm_there() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from lockstep.protocol.description import Axis, Binding, Body, ControlLayer, Pose
 from lockstep.robot_bridge.errors import ModelError
 from lockstep.robot_bridge.kinematics.capsules import separate_pairs
-from lockstep.robot_bridge.kinematics.chain import Chain, NoChain
+from lockstep.robot_bridge.kinematics.chain import Chain
 from lockstep.robot_bridge.kinematics.clearance import Clearance, GapSource
 from lockstep.robot_bridge.kinematics.obstacles import Obstacles
 from lockstep.robot_bridge.kinematics.pose_solver import JointBounds
@@ -103,12 +103,17 @@ def _view(model: Any, tool: ModelTool, bodies: Sequence[Body], base: str) -> Vie
     camera = next((each for each in cameras_of(model) if each.name == tool.camera), None)
     if camera is None:
         raise ModelError(f"{where}, which is not among the first ones, that become streams")
+    if tool.camera == tool.name or any(body.name == tool.camera for body in bodies):
+        raise ModelError(f"{where}, which is the name of a body too: nobody knows which of the two is meant")
     found = calibrated(camera, model, bodies).calibration
     if found is None:
-        raise ModelError(f"{where}, of which the model tells no field of view and no fixed place")
+        raise ModelError(
+            f"{where}, whose view or place is not known: it turns by itself (mode), has a sensorsize or no perspective,"
+            " or hangs on a body that is not described"
+        )
     try:
         return view_from(bodies, base, found.body, found.position, found.orientation)
-    except NoChain as error:
+    except ValueError as error:  # no chain, or no rotation
         raise ModelError(f"{where}: {error}") from error
 
 

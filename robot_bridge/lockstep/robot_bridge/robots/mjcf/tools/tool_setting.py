@@ -50,7 +50,9 @@ def tools_of(model: Any, actuators: Sequence[Actuator]) -> list[ModelTool]:
 
 
 def _tool(model: Any, word: str, servos: dict[int, Actuator]) -> ModelTool:
-    name, _, camera = word.partition("@")
+    name, at, camera = word.partition("@")
+    if at and not camera:
+        raise ModelError(f"{TEXT} names {word!r}, and no camera behind the @")
     site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
     body = int(model.site_bodyid[site]) if site >= 0 else mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
     if body < 0:
