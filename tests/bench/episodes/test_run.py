@@ -51,7 +51,7 @@ def test_a_dataset_of_people_and_a_policy_has_the_kept_episodes_alone_and_each_p
     assert verdict.checks["shown"].looked == dataset["pictures"]
     _shift(root, "lockstep.stamp", lambda stamps: [stamp - 1 for stamp in stamps])
     verdict = verify_dataset(root, pixels=True)
-    assert verdict.checks["aligned"].ok, "the stamps alone are as they should be"
+    assert verdict.checks["aligned"].count < dataset["pictures"] / 2, "of most, the stamps alone are as they should be"
     assert verdict.checks["shown"].count == dataset["pictures"]
     assert not look(root).ok
     _shift(root, "lockstep.stamp", lambda stamps: [stamp + 1 for stamp in stamps])
