@@ -104,18 +104,21 @@ async def test_a_supervisor_begins_and_keeps_episodes_with_keys_and_pad_while_an
 
 async def test_keys_and_the_button_keep_fail_and_mark_an_episode(tmp_path: Path, chromium: Browser) -> None:
     recordings = tmp_path / "recordings"
+    at_once = {"LOCKSTEP_EPISODES__COUNTDOWN_SECONDS": "0"}
     async with (
-        running_stack(
-            tmp_path, settings={"LOCKSTEP_EPISODES__COUNTDOWN_SECONDS": "0"}, extra=("--record", str(recordings))
-        ) as stack,
-        open_console(chromium, stack.operator) as console,
+        running_stack(tmp_path, settings=at_once, extra=("--record", str(recordings))) as stack,
+        open_console(chromium, stack.supervisor) as console,
+        Console(stack.operator, video=False, audio=False) as driver,
     ):
         await console.until_live()
+        await driver.take_seat()
         bar, keys = console.page.locator(".episode-bar"), console.page.keyboard
         await bar.locator(".episode-task").fill("push the box")
         await bar.locator(".episode-task").press("Enter")
         for number, key in enumerate("kny", 1):
             await expect(bar.locator(".episode-words")).to_contain_text(f"Take {number}")
+            for _ in range(3):
+                await drive_on(driver, [0.2, 0.0, 0.0])
             if key == "k":
                 await keys.press("m")
             elif key == "y":
