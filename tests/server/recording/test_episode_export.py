@@ -332,6 +332,43 @@ def test_a_file_of_changes_that_somebody_wrote_makes_no_discarded_episode_count(
     assert [row["lockstep.event"] for row in rows(root)] == [*range(10, 20), *range(45, 60)]
 
 
+def test_a_dataset_has_the_marks_within_each_of_its_episodes(tmp_path: Path) -> None:
+    bounds = [episode("a", "start", 10, 10), episode("a", "kept", 10, 60)]
+    marks = [
+        own_entry(
+            EpisodeRecord(
+                epoch=EPOCH,
+                event=event,
+                episode="a",
+                number=1,
+                kind="mark",
+                task="push",
+                text=text,
+                first_event=10,
+                last_event=event,
+            ),
+            START + (event - 1) * INTERVAL + 30_000_000,
+        )
+        for event, text in ((12, "touched"), (30, "slipped"), (55, "mark"))
+    ]
+    path = recording(tmp_path / "a.mcap", *bounds, *marks)
+    with RecordingReader(path) as reader:
+        recorded = episodes_of(reader)
+    assert noted(path, tmp_path / "whole") == [[(12, "touched"), (30, "slipped"), (55, "mark")]]
+    add_edit(path, recorded, EpisodeEdit(at=1.0, by="x", episode="a", first_event=14, last_event=55))
+    assert noted(path, tmp_path / "trimmed") == [[(30, "slipped"), (55, "mark")]]
+    add_edit(path, recorded, EpisodeEdit(at=2.0, by="x", episode="a", split=40))
+    assert noted(path, tmp_path / "split") == [[(30, "slipped")], [(55, "mark")]]
+
+
+def noted(path: Path, out: Path) -> list[list[tuple[int, str]]]:
+    """The marks of each episode of a new dataset."""
+    (root,) = export_lerobot.export(path, out, "")
+    assert verify_dataset(root).ok
+    notes = json.loads((root / "meta" / "lockstep.json").read_text())
+    return [[(event, text) for event, text in each["marks"]] for each in notes["episodes"]]
+
+
 def test_a_table_of_kept_episodes_has_no_row_of_another(tmp_path: Path) -> None:
     path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
     with RecordingReader(path) as reader:

@@ -220,6 +220,7 @@ def noted(rows: EpisodeRows) -> DatasetEpisode:
         rate=round(rows.rate, 3),
         recorded=stretch.recorded,
         commands=rows.commands,
+        marks=stretch.marks,
     )
 
 

@@ -12,6 +12,7 @@ import pyarrow as pa
 from lockstep.protocol.serial import event_gap
 from lockstep.server.recording.export.episode_commands import EpisodeCommands
 from lockstep.server.recording.export.lerobot_layout import LayoutChoice
+from lockstep.server.recording.format.records import Whole
 
 __all__ = [
     "EVENTS",
@@ -63,6 +64,7 @@ class DatasetEpisode(msgspec.Struct, frozen=True, kw_only=True):
     rate: float = 0.0  # Hz, by the median interval of its events; 0: not known
     recorded: tuple[str, ...] = ()  # ids of the recorded episodes that it was made of; empty: an earlier version, whole
     commands: EpisodeCommands | None = None  # None: not known, of an earlier version
+    marks: tuple[tuple[Whole, str], ...] = ()  # event, words: what somebody marked in it
 
     def shared(self, recording: str, epoch: str, first_event: int, last_event: int) -> range:
         """Return which of these events are among its own, by their distance from the first one.

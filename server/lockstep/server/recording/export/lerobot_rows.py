@@ -69,6 +69,7 @@ class Stretch(NamedTuple):
     outcome: EpisodeOutcome
     ended: int  # µs since 1970; pictures that came later are not of it, so that nobody has to wait for them
     recorded: tuple[str, ...] = ()  # ids of the recorded episodes that it was made of
+    marks: tuple[tuple[int, str], ...] = ()  # event, words
 
 
 class EpisodeRows(NamedTuple):
@@ -132,7 +133,12 @@ def _stretch(reader: RecordingReader, episode: EditedEpisode) -> Stretch:
         entry.outcome,
         entry.ended,
         episode.recorded,
+        tuple(mark for mark in entry.marks if _is_marked_in(mark[0], entry)),
     )
+
+
+def _is_marked_in(event: int, entry: EpisodeEntry) -> bool:
+    return event_gap(event, entry.first_event) >= 0 and event_gap(entry.last_event, event) >= 0
 
 
 def _whole_stretch(reader: RecordingReader, task: str) -> Stretch:
