@@ -5,7 +5,7 @@ import os
 import shutil
 import signal
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
 import pytest
@@ -98,6 +98,49 @@ async def test_the_page_says_that_the_disk_fills_and_then_that_the_episode_is_lo
             await expect(bar.get_by_role("button", name="Keep")).to_be_disabled()
         ballast.unlink()
         assert _states(recordings) == ["open"], "it has no end in the file"
+
+
+async def test_the_page_says_that_an_episode_is_lost_when_the_robots_bridge_is_killed(
+    tmp_path: Path, chromium: Browser
+) -> None:
+    record = ("--record", str(tmp_path / "recordings"))
+    async with (
+        running_bridge("planar") as bridge,
+        running_console(tmp_path, bridge.address, bridge.event_log, record) as stack,
+        _taking(chromium, stack, "bridge-killed") as (bar, driver),
+    ):
+        await drive_on(driver, [0.2, 0.0, 0.0])
+        await bridge.process.kill()
+        await expect(bar.locator(".episode-words")).to_contain_text("Episode 1 is lost: the robot link was lost")
+        await expect(bar.get_by_role("button", name="Keep")).to_be_disabled()
+
+
+@pytest.mark.parametrize("phase", ["countdown", "open"])
+async def test_the_page_says_what_became_of_an_episode_when_the_console_is_killed(
+    tmp_path: Path, chromium: Browser, monkeypatch: pytest.MonkeyPatch, phase: str
+) -> None:
+    monkeypatch.setenv("LOCKSTEP_EPISODES__COUNTDOWN_SECONDS", "30" if phase == "countdown" else "0")
+    record = ("--record", str(tmp_path / "recordings"))
+    async with running_bridge("planar") as bridge, AsyncExitStack() as closing:
+        async with running_console(tmp_path, bridge.address, bridge.event_log, record) as first:
+            console = await closing.enter_async_context(open_console(chromium, first.supervisor))
+            await console.until_live()
+            bar = console.page.locator(".episode-bar")
+            words = bar.locator(".episode-words")
+            await bar.locator(".episode-task").fill("push the box")
+            await bar.locator(".episode-task").press("Enter")
+            await expect(words).to_contain_text("Take 1" if phase == "open" else "Begins in ")
+            await first.running.kill()
+        if phase == "open":
+            await expect(words).to_have_text("Take 1: the console does not answer")
+            await expect(bar.get_by_role("button", name="Keep")).to_be_disabled()
+        else:  # nothing was begun
+            await expect(bar).to_be_hidden()
+        port = first.console.rsplit(":", 1)[1]
+        async with running_console(tmp_path, bridge.address, bridge.event_log, (*record, "--port", port)):
+            became = "Episode 1 is lost: the console has ended" if phase == "open" else "No episode yet"
+            await expect(words).to_have_text(became, timeout=60_000)
+            await expect(words).to_be_visible()
 
 
 async def _fill(ballast: Path, free: int) -> None:

@@ -7,12 +7,32 @@ from typing import Any
 
 import av
 import foxglove
+import msgspec
 import pytest
 from foxglove.websocket import WebSocketServer
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from lockstep.protocol.console import Seat, SeatOffer, SeatRequest, SeatTake
+from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.episodes import EpisodeRequest
+from lockstep.server.recording.format.topics import (
+    AXIS_COMMANDS,
+    AXIS_STATES,
+    CALIBRATION,
+    CAMERA,
+    FIXED_TRANSFORMS,
+    JOINTS,
+    MAP,
+    MICROPHONE,
+    ODOMETRY,
+    POSE,
+    SCAN,
+    SHAPES,
+    TRANSFORMS,
+    WRENCH,
+    stream_of,
+    topics_of,
+)
 from tests.server.foxglove.viewer import viewing
 from tests.server.rig import PATIENCE, Rig, eventually, running_rig
 
@@ -91,6 +111,43 @@ async def test_what_happens_is_told_and_no_message_of_a_viewer_does_anything() -
         await viewer.next_of("/log")
         assert stop.message["where"] == "http"
         assert not operator.closed.is_set()
+
+
+async def test_all_that_a_recording_would_have_is_offered_and_what_is_measured_arrives() -> None:
+    """The robot has a base, bodies, joints, a wrench, ranges, a map, and a camera whose place is known."""
+    async with (
+        running_rig(foxglove={"port": 0}, seat_timeout=60.0) as rig,
+        viewing(await listening(rig)) as viewer,
+        rig.peer("operator") as operator,
+    ):
+        await viewer.subscribe("/lockstep/robot", "/lockstep/stamp")
+        robot = await viewer.next_of("/lockstep/robot")
+        description = msgspec.convert(robot.message["description"], RobotDescription)
+        media = [each for each in viewer.channels if each.startswith((CAMERA, MICROPHONE))]
+        codecs = {stream_of(each): "H264" if each.startswith(CAMERA) else "opus" for each in media}
+        recorded = {each.name for each in topics_of(description, codecs)}
+        assert viewer.channels.keys() == recorded | {"/lockstep/stamp"}
+        calibrations = {CALIBRATION + each.name for each in description.cameras if each.calibration is not None}
+        measured = {JOINTS, SCAN, POSE, ODOMETRY, WRENCH, AXIS_STATES, AXIS_COMMANDS, TRANSFORMS}
+        told = {FIXED_TRANSFORMS, SHAPES, MAP, *calibrations, *media}
+        await viewer.subscribe(*measured, *told, "/lockstep/command", "/lockstep/status", "/lockstep/navigation")
+        operator.send("session", SeatRequest())
+        await operator.until(lambda each: isinstance(each, Seat) and bool(each.holder))
+        await operator.feedback()
+        await operator.drive([0.2, 0.0, 0.1])
+        for topic in (*measured, *told, "/lockstep/command", "/lockstep/status", "/lockstep/navigation"):
+            await viewer.next_of(topic)
+        commands = await viewer.next_of(AXIS_COMMANDS, lambda each: any(axis.value for axis in each.axes))
+        wrench, odometry = viewer.of(WRENCH)[0], viewer.of(ODOMETRY)[0]
+        (calibration,) = (viewer.of(each)[0] for each in calibrations)
+        shapes = viewer.of(SHAPES)[0]
+    assert calibrations
+    assert [axis.value for axis in commands.message.axes] == pytest.approx([0.2, 0.0, 0.1])
+    assert wrench.frame_id
+    assert odometry.frame_id != odometry.body_frame_id
+    assert calibration.width > 0
+    assert len(calibration.K) == 9
+    assert {each.frame_id for each in shapes.entities} <= {each.name for each in description.bodies} | {""}
 
 
 async def test_who_subscribes_without_end_calls_nothing_in_the_console(monkeypatch: pytest.MonkeyPatch) -> None:
