@@ -56,8 +56,11 @@ async def _in_an_episode(
 
 
 async def _ask(stack: Stack, link: str, do: str, **body: str) -> httpx.Response:
+    """`do`: "" asks for the state."""
     async with httpx.AsyncClient(trust_env=False) as http:
         headers = {"Authorization": f"Bearer {parse_link(link).token}"}
+        if not do:
+            return await http.get(f"{stack.console}/api/episode", headers=headers)
         return await http.post(f"{stack.console}/api/episode/{do}", json=body, headers=headers)
 
 
@@ -100,13 +103,20 @@ async def test_episodes_of_a_session_are_in_its_file_as_they_were_kept(tmp_path:
             with pytest.raises(EpisodeRefused, match="other_episode"):
                 await console.episodes.keep("success", first)
             assert (await _ask(stack, stack.observer, "keep")).json()["error"] == "not_allowed"
+            assert (await _ask(stack, stack.observer, "mark", text="no")).json()["error"] == "not_allowed"
+            assert (await _ask(stack, stack.supervisor, "mark", text="wobbled")).status_code == 200
             kept = await _ask(stack, stack.supervisor, "keep", outcome="failure", episode=third)
             assert (kept.status_code, kept.json()["kept"], kept.json()["discarded"]) == (200, 2, 1)
             answer = await _ask(stack, stack.supervisor, "discard")
             assert (answer.status_code, answer.json()["error"]) == (409, "no_episode")
             await console.episodes.start()
             await _drive(console)
+            again = await _ask(stack, stack.supervisor, "redo")
+            assert (again.status_code, again.json()["phase"], again.json()["discarded"]) == (200, "open", 2)
+            await _drive(console)
             await console.episodes.discard()
+            asked = await _ask(stack, stack.observer, "")
+            assert (asked.json()["phase"], asked.json()["kept"], asked.json()["discarded"]) == ("idle", 2, 3)
     (path,) = recordings.glob("*.mcap")
     found = _episodes(path)
     assert [(each.id, each.state, each.outcome) for each in found[:3]] == [
@@ -114,8 +124,8 @@ async def test_episodes_of_a_session_are_in_its_file_as_they_were_kept(tmp_path:
         (second, "discarded", ""),
         (third, "kept", "failure"),
     ]
-    assert [each.state for each in found[3:]] == ["discarded"]
-    assert [text for _, text in found[0].marks] == ["touched"]
+    assert [each.state for each in found[3:]] == ["discarded", "discarded"]
+    assert [[text for _, text in each.marks] for each in found[:3]] == [["touched"], [], ["wobbled"]]
     assert found[0].drivers == ["Ada"]
     assert all(each.last_event > each.first_event for each in found)
     verdict = verify_file(path)
