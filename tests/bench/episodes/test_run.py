@@ -15,6 +15,7 @@ from lockstep.bench.episodes.pixels import look
 from lockstep.robot_bridge.robots.so101.model_source import FOLDER_VARIABLE
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from tests.robot_bridge.robots.so101.driver import MODEL_FOLDER
+from tests.server.recording.graders import PASSED, doctor_findings, graded_defects
 
 FEW = ["--times", "3", "--discard", "1", "--redo", "1", "--no-pictures"]
 
@@ -46,6 +47,9 @@ def test_a_dataset_of_people_and_a_policy_has_the_kept_episodes_alone_and_each_p
     assert (dataset["unreadable"], dataset["outside"], dataset["mislabelled"]) == (0, 0, 0)
     root = tmp_path / "dataset"
     assert look(root).ok
+    passed, more = doctor_findings(root)
+    assert (passed & PASSED, more) == (PASSED, [])
+    assert {name: defective for name, (_, defective) in graded_defects(root).items() if defective} == {}
     verdict = verify_dataset(root, pixels=True)
     assert verdict.ok
     assert verdict.checks["shown"].looked == dataset["pictures"]
@@ -92,7 +96,7 @@ def test_faults_among_the_episodes_leave_a_dataset_of_the_kept_ones() -> None:
     [figures] = json.loads(done.stdout)["runs"]
     assert [(each["fault"], each["ok"]) for each in figures["faults"]] == [("kill-open", True), ("kill-robot", True)]
     assert "lost" in " ".join(figures["faults"][1]["said"])
-    assert (figures["kept"], figures["in_dataset"]) == (2, 2)
+    assert (figures["kept"], figures["in_dataset"], len(figures["appended"]["rows"])) == (2, 2, 2)
     assert min(each["rows"] for each in figures["runs"]) > 5
 
 

@@ -24,7 +24,7 @@ from lockstep.server.recording.format.topics import CAMERA
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from lockstep.server.recording.writing.writer import Entry
-from tests.server.recording.graders import doctor_counts, graded_defects
+from tests.server.recording.graders import PASSED, doctor_counts, doctor_findings, graded_defects
 from tests.server.recording.makers import EPOCH, INFO, INTERVAL, START, Story, own_entry, rewritten
 
 DATA = Path("data/chunk-000/file-000.parquet")
@@ -113,6 +113,7 @@ def test_a_checker_that_others_wrote_takes_a_dataset_of_several_episodes(tmp_pat
     counts = doctor_counts(root)
     assert counts["FAIL"] == 0, counts
     assert counts["PASS"] >= 5, counts
+    assert doctor_findings(root) == (PASSED, [])
 
 
 def test_a_grader_that_others_wrote_finds_no_defect_but_the_one_that_was_planted(tmp_path: Path) -> None:

@@ -113,6 +113,12 @@ def _table(figures: dict[str, Any]) -> str:
         f"{dataset.get('tolerance', 0)} events, pictures by gap {dataset.get('gaps', {})}"
     )
     lines += [f"WRONG: {each}" for each in dataset["wrong"]]
+    if (appended := figures.get("appended")) is not None:
+        lines.append(
+            f"appended: {len(appended.get('rows', []))} episodes, {appended['while_driving']} of them while people "
+            f"drove, pictures by gap {appended.get('gaps', {})}"
+        )
+        lines += [f"WRONG, appended: {each}" for each in appended["wrong"]]
     return "\n".join(lines)
 
 

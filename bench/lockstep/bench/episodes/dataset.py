@@ -28,9 +28,10 @@ class Kept(NamedTuple):
     person: str  # who began it
 
 
-async def export(recordings: Sequence[Path], root: Path) -> str:
-    """Export to a new folder by `lockstep export`; return "" or what it said when it failed."""
+async def export(recordings: Sequence[Path], root: Path, *, append: bool = False) -> str:
+    """Export to a new folder, or append, by `lockstep export`; return "" or what it said when it failed."""
     command = (LOCKSTEP, "export", *map(str, recordings), "--to", "lerobot", "--out", str(root))
+    command += ("--append",) if append else ()
     done = await asyncio.to_thread(
         subprocess.run, command, capture_output=True, text=True, timeout=EXPORT_SECONDS, check=False
     )

@@ -1,10 +1,12 @@
 """The planned episodes, through a network if one is given, with a fault after every few of them.
 
 Each fault strikes in an episode of its own, beside the planned ones. Then robot, network, console and drivers begin
-anew in the same folder, as people do after a crash. The dataset of the whole day must have exactly what was kept.
+anew in the same folder, as people do after a crash. The dataset of the whole day must have exactly what was kept. So
+must a second one, to which episodes are appended while they are driven, by a process that is killed at each fault.
 """
 
 import asyncio
+import json
 from collections.abc import Callable, Sequence
 from contextlib import AsyncExitStack, ExitStack
 from dataclasses import dataclass, field
@@ -20,12 +22,15 @@ from lockstep.bench.episodes.session import Done, Session, drivers
 from lockstep.bench.episodes.small_disk import cancel_on_sigterm, small_disk
 from lockstep.bench.experiment.choices import media_of
 from lockstep.bench.experiment.stage import running_stage
+from lockstep.bench.harness.processes import started
+from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.bench.pick_place.run import recorder_of
 from lockstep.emulator.impairment.profile import load_profile
 
 __all__ = ["Day", "record_faulted_day", "shares"]
 
 NO_NETWORK: Final = "perfect"
+APPENDED: Final = ("rows", "pictures", "unreadable", "outside", "mislabelled", "gaps", "wrong", "verified")
 DISK_BYTES: Final = 1 << 30  # for the recordings of a whole day
 
 
@@ -57,6 +62,15 @@ class Day:
         """The episodes of which somebody was told that they are kept."""
         return [each for place, each in enumerate(self.kept) if place not in self.perhaps]
 
+    async def judged(self, root: Path, said: str) -> dict[str, Any]:
+        """Return what a dataset of the day is like. `said`: by the export, when it failed."""
+        if said:
+            return {"wrong": [f"export: {said}"]}
+        found = await judged(root, self.told)
+        if found["wrong"] and self.perhaps:  # of one at most, which kill-keeping leaves open
+            found = await judged(root, self.kept)
+        return found
+
 
 async def record_faulted_day(
     choices: Choices, faults: Sequence[FaultName], say: Callable[[str], None]
@@ -71,21 +85,28 @@ async def record_faulted_day(
     day = Day()
     with TemporaryDirectory(prefix="lockstep-bench-") as directory, ExitStack() as stack:
         folder = Path(directory)
-        recordings, root = folder / "recordings", folder / "dataset"
+        recordings, root, live = folder / "recordings", folder / "dataset", folder / "live"
         recordings.mkdir()
         if set(faults) & set(DISK_FAULTS):
             stack.enter_context(small_disk(recordings, DISK_BYTES))
         for number, (fault, some) in enumerate(zip(faults, shares(planned, len(faults)), strict=True)):
             await _until_fault(choices, fault, some, folder, day, say, seed=choices.seed + number)
         files = sorted(recordings.glob("*.mcap"))
-        said = await export(files, root)
-        dataset = {"wrong": [f"export: {said}"]} if said else await judged(root, day.told)
-        if dataset["wrong"] and day.perhaps and not said:  # of one at most, which kill-keeping leaves open
-            dataset = await judged(root, day.kept)
+        dataset = await day.judged(root, await export(files, root))
+        in_time = await asyncio.to_thread(_appended, live)
+        appended = await day.judged(live, await export(files, live, append=True))
         await asyncio.to_thread(keep_files, choices.keep, files, root)
     figures = figures_of(choices, day.done, dataset)
-    ok = figures["ok"] and all(each["ok"] for each in day.faults)
-    return figures | {"faults": day.faults, "in_dataset": len(dataset.get("rows", [])), "ok": ok}
+    ok = figures["ok"] and not appended["wrong"] and all(each["ok"] for each in day.faults)
+    more = {"faults": day.faults, "in_dataset": len(dataset.get("rows", [])), "ok": ok}
+    told = {name: each for name, each in appended.items() if name in APPENDED} | {"while_driving": in_time}
+    return figures | more | {"appended": told}
+
+
+def _appended(root: Path) -> int:
+    """Return how many episodes a dataset has."""
+    info = root / "meta" / "info.json"
+    return int(json.loads(info.read_text())["total_episodes"]) if info.exists() else 0
 
 
 def shares(planned: Sequence[Planned], count: int) -> list[Sequence[Planned]]:
@@ -110,6 +131,7 @@ async def _until_fault(
         stage = await stack.enter_async_context(
             running_stage(ROBOT, profile, media_of(profile), seed, robot_link=through, settings=settings)
         )
+        following = await stack.enter_async_context(started(_follow(folder)))
         recorder = await stack.enter_async_context(recorder_of(stage.near_link))
         named = await links_of(stage, recorder, through=through)
         consoles = await stack.enter_async_context(drivers(named, pictures=choices.pictures))
@@ -121,4 +143,11 @@ async def _until_fault(
         await meet(run)
         day.add(done, run)
         say(f"{fault}: {'; '.join(run.wrong) or 'right'}; the console said: {'; '.join(run.said)}")
+        await following.kill()
         await stage.console.end()  # one that still lives ends its recording
+
+
+def _follow(folder: Path) -> tuple[str, ...]:
+    """Return the command that appends each kept episode while others are driven."""
+    where = ("--out", str(folder / "live"), "--dir", str(folder / "recordings"), "--state-dir", str(folder))
+    return (LOCKSTEP, "export", "--to", "lerobot", "--follow", *where)
