@@ -91,7 +91,7 @@ async def test_record_makes_a_dataset_whose_pictures_are_of_its_states_and_repla
         assert console.feedback.at_rest
 
 
-async def test_record_across_the_hong_kong_network_has_pictures_of_its_states(arm: Arm, tmp_path: Path) -> None:
+async def test_record_replay_and_teleoperate_work_across_the_hong_kong_network(arm: Arm, tmp_path: Path) -> None:
     folder = tmp_path / "far"
     async with NetworkProcess("hong-kong") as network:
         await network.open_console(arm.stack.console)
@@ -102,10 +102,27 @@ async def test_record_across_the_hong_kong_network_has_pictures_of_its_states(ar
             dataset=folder,
             link=network.link(arm.stack.operator),
         )
-    states, pictures = np.array(rows(folder)["observation.state"])[:, 0], np.array(greys(folder))
-    assert len(states) == len(pictures) > 5
-    assert np.ptp(states) > 5.0
-    assert np.abs(pictures - GREY - states).max() < NEAR
+        states, pictures = np.array(rows(folder)["observation.state"])[:, 0], np.array(greys(folder))
+        assert len(states) == len(pictures) > 5
+        assert np.ptp(states) > 5.0
+        assert np.abs(pictures - GREY - states).max() < NEAR
+        far = network.link(arm.stack.operator)
+        stack = await run_driving(
+            *(arm, tmp_path, "lerobot-replay", "--robot.type=lockstep", "--dataset.repo_id=tests/far"),
+            *(f"--dataset.root={folder}", "--dataset.episode=0", "--play_sounds=false", *PATIENT),
+            link=far,
+        )
+        assert len(await stack.events("executed")) >= len(states)
+        here = await arm.stack.from_here()
+        await run_driving(
+            *(arm, tmp_path, "lerobot-teleoperate", "--robot.type=lockstep", *LEADER),
+            *("--fps=10", f"--teleop_time_s={SECONDS}", *PATIENT),
+            link=far,
+        )
+    executed = await here.events("executed")
+    places = [each["values"][0] for each in executed if each["values"][0] is not None]
+    assert max(places) - min(places) > 5.0
+    assert (await here.events("at_rest"))[-1]["time"] > executed[-1]["time"]
 
 
 async def test_teleoperate_drives_and_leaves_the_arm_at_rest(arm: Arm, tmp_path: Path) -> None:

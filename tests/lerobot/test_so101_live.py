@@ -2,15 +2,20 @@
 
 import asyncio
 import json
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from lockstep.bench.harness.free_port import free_port
+from lockstep.bench.harness.processes import running_process, started
+from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.client import Console
-from tests.lerobot.commands import PATIENCE, newest, reach
+from tests.lerobot.commands import PATIENCE, environment, lerobot_python, newest, reach
 from tests.lerobot.conftest import running_arm
 from tests.lerobot.parts.feetech_bus import FeetechBus
+from tests.lerobot.test_drive_live import driving
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(1500)]
 
@@ -26,9 +31,9 @@ def bus() -> Iterator[FeetechBus]:
     found.close()
 
 
-def calibrated(directory: Path) -> None:
+def calibrated(directory: Path, kind: str = "robots/so_follower") -> None:
     """Write the file that lerobot-calibrate would have written."""
-    folder = directory / "lerobot/calibration/robots/so_follower"
+    folder = directory / "lerobot/calibration" / kind
     folder.mkdir(parents=True)
     motors = {
         name: {
@@ -72,6 +77,63 @@ async def test_its_joints_are_degrees_and_follow_goals_and_its_torque_stays_on(b
         assert bus.place(6) == pytest.approx(2100, abs=60)
         assert bus.place(3) == pytest.approx(2048, abs=5)
     assert all(servo.has_torque for servo in bus.servos.values())
+
+
+async def test_a_page_leads_lerobots_own_follower(bus: FeetechBus, tmp_path: Path) -> None:
+    """`lerobot-teleoperate` with the teleoperator that is a robot for a console."""
+    calibrated(tmp_path)
+    port = free_port()
+    leads = (
+        "--teleop.type=lockstep",
+        "--teleop.source=page",
+        f"--teleop.port={port}",
+        "--teleop.start={gripper.pos: 50}",
+    )
+    follows = ("--robot.type=so101_follower", f"--robot.port={bus.port}", "--robot.id=desk")
+    teleoperate = (str(Path(lerobot_python()).with_name("lerobot-teleoperate")), *follows, *leads, "--fps=20")
+    own = {**environment(tmp_path), "LOCKSTEP_PYTHON": sys.executable}
+    serve = (str(LOCKSTEP), "serve", "--robot", f"tcp://127.0.0.1:{port}", "--port", "0", "--json")
+    async with started(teleoperate, environment=own) as command:
+        await command.listening(port)
+        async with (
+            running_process(*serve, "--state-dir", str(tmp_path / "state")) as (_, links),
+            Console(links["operator"], audio=False, video=False) as console,
+        ):
+            await console.take_seat()
+            await reach(console, {"shoulder_pan.pos": 45.0, "gripper.pos": 10.0})
+            async with asyncio.timeout(PATIENCE):
+                while abs(bus.place(1) - 2048 - 45 * STEPS_PER_DEGREE) > 30 or abs(bus.place(6) - 2100) > 60:  # noqa: ASYNC110
+                    await asyncio.sleep(0.05)
+            assert bus.place(3) == pytest.approx(2048, abs=5)
+
+
+async def test_lerobots_own_leader_leads_an_arm_only_while_the_key_is_held(bus: FeetechBus, tmp_path: Path) -> None:
+    """`lockstep drive --teleop so101_leader`; a hand moves its motors."""
+    calibrated(tmp_path, "teleoperators/so_leader")
+    leader = ("--teleop", "so101_leader", f"--teleop.port={bus.port}", "--teleop.id=desk")
+    async with (
+        running_arm(tmp_path) as arm,
+        Console(arm.stack.observer, audio=False, video=False) as watching,
+        driving(tmp_path, arm.stack.operator, *leader, "--map", "shoulder_pan.pos=pan.pos*1") as terminal,
+    ):
+        await terminal.says("hold the space bar")
+        before = (await newest(watching)).axes[0]
+        bus.turn(1, 20 * STEPS_PER_DEGREE)  # nobody holds the key
+        async with terminal.holding(" "):
+            await terminal.says("drives")
+            for _ in range(15):
+                bus.turn(1, STEPS_PER_DEGREE)
+                await asyncio.sleep(0.05)
+            async with asyncio.timeout(PATIENCE):
+                async for feedback in watching.feedbacks():
+                    if abs(feedback.axes[0] - before - 15.0) < 1.5:
+                        break
+        await terminal.says("rests")
+        bus.turn(1, -30 * STEPS_PER_DEGREE)
+        await asyncio.sleep(1.0)
+        assert watching.feedback is not None
+        assert watching.feedback.axes[0] == pytest.approx(before + 15.0, abs=1.5)
+        assert not bus.servos[1].has_torque, "a hand has to move it"
 
 
 async def test_motors_that_are_silent_make_the_state_unknown(bus: FeetechBus, tmp_path: Path) -> None:

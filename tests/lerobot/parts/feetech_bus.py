@@ -84,6 +84,12 @@ class FeetechBus:
             self.servos[number].move()
             return self.servos[number].place
 
+    def turn(self, number: int, steps: float) -> None:
+        """A hand turns a motor that has no torque."""
+        with self._lock:
+            self.servos[number].move()
+            self.servos[number].place += steps
+
     def close(self) -> None:
         os.close(self._slave)
         self._thread.join(5)  # the last end of the terminal is closed, so that the reading ends
