@@ -8,11 +8,12 @@ import math
 import statistics
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from lockstep.bench.sections.driving.ik_ticks import TickTimes, tick_times
 from lockstep.robot_bridge.robots.base import Robot
 from lockstep.robot_bridge.robots.mjcf import create
 from lockstep.robot_bridge.robots.registry import create_robot
@@ -23,42 +24,23 @@ STEPS = 3000
 SWING = 0.06  # m, to and fro along y
 
 
-def show(what: str, *calls: Callable[[int], object]) -> None:
-    """Print the processor time of each of the calls, which follow each other."""
-    spent: list[list[float]] = [[] for _ in calls]
-    for number in range(STEPS):
-        for times, call in zip(spent, calls, strict=True):
-            before = time.thread_time()
-            call(number)
-            times.append(1e6 * (time.thread_time() - before))
-    for times, part in zip(spent, ("", ", after the feedback"), strict=False):
-        median, late = statistics.median(times), statistics.quantiles(times, n=100)[-1]
-        print(f"{what + part:44}{median:6.0f} µs, 99 % below {late:6.0f} µs")
+def show(what: str, times: Sequence[float]) -> None:
+    """Print processor times, in µs."""
+    median, late = statistics.median(times), statistics.quantiles(times, n=100)[-1]
+    print(f"{what:44}{median:6.0f} µs, 99 % below {late:6.0f} µs")
 
 
 def measure(robot: Robot) -> None:
     description = robot.describe()
-    pose = description.poses[0]
-    number = [axis.name for axis in description.axes].index(pose.position[1])
-    values = list(robot.goals())
-    begun = values[number]
-    robot.apply(values)
-    robot.tick()
+    print(f"{description.label}: {len(description.poses[0].instead_of)} joints")
+    tell("one tick, tool driven", tick_times(robot, STEPS))
+    tick_times(robot, 100, driven=False)  # it comes to rest
+    tell("one tick, at rest", tick_times(robot, STEPS, driven=False))
 
-    def drive(step: int) -> None:
-        values[number] = begun + SWING * math.sin(step / 100)
-        robot.apply(values)
-        robot.tick()
 
-    def rest(step: int) -> None:
-        robot.apply(values)
-        robot.tick()
-
-    print(f"{description.label}: {len(pose.instead_of)} joints")
-    show("one tick, tool driven", drive, lambda _: robot.prepare())
-    for _ in range(100):
-        rest(0)
-    show("one tick, at rest", rest, lambda _: robot.prepare())
+def tell(what: str, times: TickTimes) -> None:
+    for part, found in zip(("", ", after the feedback"), times, strict=True):
+        show(what + part, [1000 * each for each in found])
 
 
 def measure_solver(robot: Robot) -> None:
@@ -67,12 +49,13 @@ def measure_solver(robot: Robot) -> None:
     solver, joints = arm_solver(robot.describe(), chain), HOME[:5]
     begun = chain.at(joints)
 
-    def solve(step: int) -> None:
-        nonlocal joints
+    times = []
+    for step in range(STEPS):
         goal = begun.position + np.array((0.0, SWING * math.sin(step / 100), 0.0))
+        before = time.thread_time()
         joints = solver.step(joints, goal, begun.rotation, robot.tick_seconds).joints
-
-    show("one step of the solver", solve)
+        times.append(1e6 * (time.thread_time() - before))
+    show("one step of the solver", times)
 
 
 def main() -> None:

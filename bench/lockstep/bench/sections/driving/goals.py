@@ -3,10 +3,15 @@
 Neutral commands, which the robot executes in the same way but which have no goal, are the baseline: in turns with goals
 over one connection, so that both meet the same machine. Goals of a joint are judged and shaped; those of the tool pass
 the inverse kinematics as well. Each goal lies a little beside the one before, so that the arm moves all the while.
-Needs the arm's model: lockstep robot fetch so101.
+Then the processor time of the robot's own ticks, in which the inverse kinematics runs, alone in a process. Needs the
+arm's model: lockstep robot fetch so101.
 """
 
+import asyncio
+import json
 import math
+import subprocess
+import sys
 import time
 from collections.abc import Sequence
 
@@ -28,6 +33,9 @@ EVENTS = 40  # of each kind in a turn
 BASELINE = "neutral commands in turns with them"
 NEUTRAL = ""
 AXES = {"a joint's goals": "shoulder_pan", "goals of the tool": "tool.z"}
+ALLOWED_TIMES = 1.10  # what goals may add to the median
+TICKS_OF = ("so101", "mobile-manipulator-goals")
+TICK_MS = 1.0
 REACH = {"shoulder_pan": 0.05, "tool.z": 0.01}  # rad, m; how far the arm swings to each side
 PERIOD = 2.0  # s
 
@@ -45,11 +53,37 @@ async def run(context: Context) -> list[Result]:
             value=of(trips[axis]),
             unit="ms",
             baseline=of(trips[NEUTRAL]),
+            target=of(trips[NEUTRAL]) * ALLOWED_TIMES if of is median else None,
             baseline_name=BASELINE,
             samples=len(trips[axis]),
             conditions="pictures of all cameras received and decoded by the client meanwhile",
         )
         for kind, axis in AXES.items()
+        for name, of in (("median", median), ("p99", _p99))
+    ] + [row for robot in TICKS_OF for row in await _ticks(robot)]
+
+
+async def _ticks(robot: str) -> list[Result]:
+    """Measure the ticks of a robot whose tool is driven."""
+    command = (sys.executable, "-m", "lockstep.bench.sections.driving.ik_ticks", robot)
+    done = await asyncio.to_thread(subprocess.run, command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        return [
+            Result(section=SECTION, name=f"{robot}: tick", value=None, unit="ms", conditions=done.stderr.strip()[-200:])
+        ]
+    found: dict[str, list[float]] = json.loads(done.stdout)
+    whole = [sum(parts) for parts in zip(found["until_feedback"], found["ahead"], strict=True)]
+    return [
+        Result(
+            section=SECTION,
+            name=f"{robot}: tick with inverse kinematics, {part}, {name}",
+            value=of(times),
+            unit="ms",
+            target=TICK_MS if of is median else None,
+            samples=len(times),
+            conditions="processor time of one thread",
+        )
+        for part, times in (("until its feedback", found["until_feedback"]), ("whole", whole))
         for name, of in (("median", median), ("p99", _p99))
     ]
 
