@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lockstep.bench.sections.driving.ik_ticks import TickTimes, tick_times
+from lockstep.bench.robots.ik_ticks import TickTimes, tick_times
 from lockstep.robot_bridge.robots.base import Robot
 from lockstep.robot_bridge.robots.mjcf import create
 from lockstep.robot_bridge.robots.registry import create_robot

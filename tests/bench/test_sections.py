@@ -71,10 +71,14 @@ async def test_the_goals_section_compares_goals_with_neutral_commands(monkeypatc
     monkeypatch.setattr(goals, "QUICK_TURNS", 1)
     monkeypatch.setattr(goals, "EVENTS", 5)
     results = await goals.run(Context(quick=True, robots=[], say=lambda _: None))
-    assert [result.name for result in results] == [
+    added, ticks = results[:4], results[4:]
+    assert [result.name for result in added] == [
         f"so101: {kind}, {name}" for kind in ("a joint's goals", "goals of the tool") for name in ("median", "p99")
     ]
-    assert all(result.value and result.baseline and result.samples == 5 for result in results)
+    assert all(result.value and result.baseline and result.samples == 5 for result in added)
+    assert all(result.target == pytest.approx(1.1 * (result.baseline or 0.0)) for result in added[::2])
+    assert {result.name.split(":")[0] for result in ticks} == {"so101", "mobile-manipulator-goals"}
+    assert all(result.value and result.samples == 3000 for result in ticks)
 
 
 async def test_the_goals_section_says_what_is_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

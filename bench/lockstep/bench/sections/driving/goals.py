@@ -65,7 +65,7 @@ async def run(context: Context) -> list[Result]:
 
 async def _ticks(robot: str) -> list[Result]:
     """Measure the ticks of a robot whose tool is driven."""
-    command = (sys.executable, "-m", "lockstep.bench.sections.driving.ik_ticks", robot)
+    command = (sys.executable, "-m", "lockstep.bench.robots.ik_ticks", robot)
     done = await asyncio.to_thread(subprocess.run, command, capture_output=True, text=True, check=False)
     if done.returncode:
         return [

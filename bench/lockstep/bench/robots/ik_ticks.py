@@ -1,4 +1,4 @@
-"""`python -m lockstep.bench.sections.driving.ik_ticks ROBOT`: the processor time of ticks in which a tool is driven.
+"""`python -m lockstep.bench.robots.ik_ticks ROBOT`: the processor time of ticks in which a tool is driven.
 
 Prints the ms of each tick until its feedback can be sent, and of what is computed ahead after it, as JSON.
 """

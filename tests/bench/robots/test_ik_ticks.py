@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from lockstep.bench.sections.driving.ik_ticks import tick_times
+from lockstep.bench.robots.ik_ticks import tick_times
 from lockstep.robot_bridge.robots.mjcf import create
 from tests.robot_bridge.robots.mjcf.models import model_file
 from tests.robot_bridge.robots.mjcf.tools.arms import arm_model
