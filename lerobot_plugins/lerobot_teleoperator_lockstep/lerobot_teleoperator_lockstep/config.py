@@ -1,12 +1,12 @@
 """The flags of --teleop.type=lockstep."""
 
 from dataclasses import dataclass, field
-from typing import Literal
 
 from lerobot.teleoperators.config import TeleoperatorConfig
 
 __all__ = ["LockstepTeleoperatorConfig"]
 
+SOURCES = ("session", "page")
 DEGREES: dict[str, float | str] = {"unit": "deg", "slew": 60.0, "reach": 30.0}
 # An SO-101 follower in LeRobot's degrees; its calibration may allow less.
 SO101: dict[str, dict[str, float | str]] = {
@@ -26,7 +26,7 @@ class LockstepTeleoperatorConfig(TeleoperatorConfig):
 
     # "session": the goals that a person drives a Lockstep robot with, to be recorded with --robot.type=lockstep and
     # --robot.drive=false. "page": this process is the robot of a console, and leads a robot of LeRobot.
-    source: Literal["session", "page"] = "session"
+    source: str = "session"  # LeRobot's flags have no Literal
     # The Python that has Lockstep. "": LOCKSTEP_PYTHON
     python: str = ""
 
@@ -43,3 +43,7 @@ class LockstepTeleoperatorConfig(TeleoperatorConfig):
     axes: dict[str, dict[str, float | str]] = field(default_factory=lambda: dict(SO101))
     # Where the leader is at first: where the robot stands, or it goes there as soon as LeRobot begins.
     start: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.source not in SOURCES:
+            raise ValueError(f"source is {' or '.join(SOURCES)}, not {self.source!r}")
