@@ -34,12 +34,15 @@ export function episodeLabels(
   const count = countWords(state);
   switch (state.phase) {
     case "countdown": {
+      if (isSilent(state, ageSeconds)) return { tone: "bad", text: SILENT, time: "", count };
       const left = Math.max(0, Math.ceil(state.seconds_left - ageSeconds));
       return { tone: "wait", text: left > 0 ? `Begins in ${left}` : "Begins", time: "", count };
     }
     case "resetting":
+      if (isSilent(state, ageSeconds)) return { tone: "bad", text: SILENT, time: "", count };
       return { tone: "wait", text: `Reset: ${state.reset_action}`, time: "", count };
     case "keeping":
+      if (isSilent(state, ageSeconds)) return { tone: "bad", text: unknownWords(state), time: "", count };
       return { tone: "wait", text: "Being written", time: "", count };
     case "open":
       if (isSilent(state, ageSeconds)) return { tone: "bad", text: unknownWords(state), time: "", count };
@@ -65,10 +68,12 @@ export function episodeLabels(
 }
 
 const SILENT_SECONDS = 3;
+const SILENT = "The console does not answer";
+const HEARD: ReadonlySet<EpisodeState["phase"]> = new Set(["countdown", "keeping", "open", "resetting"]);
 
-/** Whether nothing was heard of the open episode for longer than that takes: every second. */
+/** Whether nothing was heard of an episode on its way for longer than that takes: every second. */
 export function isSilent({ phase }: EpisodeState, ageSeconds: number): boolean {
-  return phase === "open" && ageSeconds > SILENT_SECONDS;
+  return HEARD.has(phase) && ageSeconds > SILENT_SECONDS;
 }
 
 /** Nobody knows what becomes of an episode while the console does not answer. */

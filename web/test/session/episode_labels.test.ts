@@ -42,6 +42,13 @@ const RECORDING: RecordingState = {
 it("counts down, and says how long the open one runs", () => {
   const counting = episodeLabels({ ...IDLE, phase: "countdown", seconds_left: 3 }, RECORDING, 0.5, 0);
   expect(counting).toMatchObject({ tone: "wait", text: "Begins in 3" });
+  for (const phase of ["countdown", "resetting"] as const)
+    expect(episodeLabels({ ...IDLE, phase, seconds_left: 9 }, RECORDING, 3.5, 0)).toMatchObject({
+      tone: "bad",
+      text: "The console does not answer",
+    });
+  const keeping = episodeLabels({ ...IDLE, phase: "keeping", number: 7 }, RECORDING, 3.5, 0);
+  expect(keeping.text).toBe("Take 7: the console does not answer");
   const open = episodeLabels({ ...IDLE, phase: "open", number: 7 }, RECORDING, 0, 65);
   expect(open).toMatchObject({ tone: "on", text: "Take 7", time: "1:05" });
 });

@@ -236,7 +236,9 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
       task.disabled = current.phase === "countdown";
       for (const each of buttons) {
         each.element.disabled =
-          !each.works(current) || (recording?.state !== "recording" && !isOpen(current));
+          !each.works(current) ||
+          isSilent(current, age) ||
+          (recording?.state !== "recording" && !isOpen(current));
       }
     },
   };

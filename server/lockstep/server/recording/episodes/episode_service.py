@@ -129,6 +129,8 @@ class EpisodeService:
                     self._act(self._core.tick(self._place.now(), time.monotonic()), before=phase)
                 if self._core.phase == "resetting" and (ended := self._reset.ended()) is not None:
                     self._act(self._core.reset_ended(ended, self._place.now(), time.monotonic()), before="resetting")
+                if self._core.phase in ("countdown", "resetting", "keeping") and ticks % NEWS_TICKS == 0:
+                    self._tell()  # who waits knows that the console still counts
                 current = self._core.current if self._core.phase == "open" else None
                 if current is not None and ticks % CHECK_TICKS == 0:
                     changed = self._checks.look(self._clock.event, current)
