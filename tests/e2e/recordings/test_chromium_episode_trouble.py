@@ -95,7 +95,7 @@ async def test_the_page_says_that_the_disk_fills_and_then_that_the_episode_is_lo
             await expect(bar.locator(".episode-words")).to_contain_text(
                 "Episode 1 is lost: only 8 MB are free on the disk"
             )
-            await expect(bar.get_by_role("button", name="Keep")).to_be_disabled()
+            await expect(bar.get_by_role("button", name="Keep")).to_be_hidden()
         ballast.unlink()
         assert _states(recordings) == ["open"], "it has no end in the file"
 
@@ -112,7 +112,7 @@ async def test_the_page_says_that_an_episode_is_lost_when_the_robots_bridge_is_k
         await drive_on(driver, [0.2, 0.0, 0.0])
         await bridge.process.kill()
         await expect(bar.locator(".episode-words")).to_contain_text("Episode 1 is lost: the robot link was lost")
-        await expect(bar.get_by_role("button", name="Keep")).to_be_disabled()
+        await expect(bar.get_by_role("button", name="Keep")).to_be_hidden()
 
 
 @pytest.mark.parametrize("phase", ["countdown", "open"])
@@ -136,7 +136,7 @@ async def test_the_page_says_what_became_of_an_episode_when_the_console_is_kille
         else:
             await expect(words).to_have_text("The console does not answer")
         for name in ("Begin", "Keep", "Discard"):
-            await expect(bar.get_by_role("button", name=name, exact=True)).to_be_disabled()
+            await expect(bar.get_by_role("button", name=name, exact=True)).to_be_hidden()
         port = first.console.rsplit(":", 1)[1]
         async with running_console(tmp_path, bridge.address, bridge.event_log, (*record, "--port", port)):
             became = "Episode 1 is lost: the console has ended" if phase == "open" else "No episode yet"

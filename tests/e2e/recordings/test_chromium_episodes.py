@@ -46,7 +46,7 @@ async def test_a_supervisor_begins_and_keeps_episodes_with_keys_and_pad_while_an
         await driver.take_seat()
         bar = page.locator(".episode-bar")
         await expect(bar.locator(".episode-words")).to_have_text("No episode yet")
-        await expect(bar.get_by_role("button", name="Keep")).to_be_disabled()
+        await expect(bar.get_by_role("button", name="Keep")).to_be_hidden()
         await _shot(page, "idle")
         assert await findings(page) == []
         await page.keyboard.press("b")
@@ -157,7 +157,7 @@ async def test_an_episode_that_was_open_when_the_console_ended_is_said_to_be_los
             await bar.locator(".episode-task").press("Enter")
             await expect(bar.locator(".episode-words")).to_contain_text("Take 1")
         await expect(bar.locator(".episode-words")).to_have_text("Take 1: the console does not answer")
-        await expect(bar.get_by_role("button", name="Keep")).to_be_disabled()
+        await expect(bar.get_by_role("button", name="Keep")).to_be_hidden()
         await _shot(page_console.page, "console-ended")
         async with running_stack(tmp_path, settings=SETTINGS, extra=record, port=port):
             await expect(bar.locator(".episode-words")).to_have_text(
