@@ -12,6 +12,7 @@ __all__ = ["PASSED", "doctor_counts", "doctor_findings", "graded_defects"]
 # no statistics.
 WARNS_OF = (
     *("zero variance", "zero std", "constant", "sudden large action jumps", "action jump", "flagged"),
+    *("consecutive identical", "frozen actions", "extreme outlier"),
     *("shorter than", "too short", "not in stats.json: ['lockstep.driver', 'lockstep.driver_kind']"),
 )
 PASSED = {

@@ -138,7 +138,15 @@ test("a tool's frame stands where it was measured, and its goal's where that is 
     axes: names.map((name) => goalAxisOf(name)),
     poses: [
       {
-        ...{ name: "tool", label: "Tool", body: "hand", frame: "", point: [0, 0, 0.1], instead_of: [], settling: 0 },
+        ...{
+          name: "tool",
+          label: "Tool",
+          body: "hand",
+          frame: "",
+          point: [0, 0, 0.1],
+          instead_of: [],
+          settling: 0,
+        },
         ...{ position: ["x", "y", "z"], rotation: ["rx", "ry", "rz"] },
       },
     ],

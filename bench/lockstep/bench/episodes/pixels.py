@@ -115,7 +115,7 @@ def _drawn(root: Path, camera: str) -> Iterator[int | None]:
                 yield strip_event(picture.to_ndarray(format="gray"))
 
 
-def strip_event(luma: npt.NDArray[np.uint8]) -> int | None:
+def strip_event(luma: npt.NDArray[np.generic]) -> int | None:
     """Return the event in the strip over the top of a picture, shape (H, W); None: it cannot be read.
 
     The strip is the top twentieth: 32 cells of equal width, white for 1, of which the last makes the number of ones
@@ -123,7 +123,7 @@ def strip_event(luma: npt.NDArray[np.uint8]) -> int | None:
     """
     height, width = luma.shape
     rows = height // 20
-    band = luma[rows // 4 : rows - rows // 4]
+    band = luma[rows // 4 : rows - rows // 4].astype(float)
     cells = [float(band[:, (4 * at + 1) * width // 128 : (4 * at + 3) * width // 128].mean()) for at in range(32)]
     if any(BLACK <= cell <= WHITE for cell in cells):
         return None

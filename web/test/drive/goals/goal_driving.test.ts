@@ -61,7 +61,14 @@ describe("goal axes", () => {
       ...layer,
       bindings: [
         { ...binding, axis: "elbow", touch: "left_y", key_positive: "", key_negative: "" },
-        { ...binding, axis: "wrist", touch: "right_x", invert_touch: true, key_positive: "", key_negative: "" },
+        {
+          ...binding,
+          axis: "wrist",
+          touch: "right_x",
+          invert_touch: true,
+          key_positive: "",
+          key_negative: "",
+        },
       ],
     };
     const driving = new GoalDriving();
