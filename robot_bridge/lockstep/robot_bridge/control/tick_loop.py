@@ -72,7 +72,7 @@ class TickLoop:
             RobotFailed: the adapter raised.
         """
         try:
-            await self.tick_on()
+            await self._tick_on()
         except GeneratorExit:  # the loop is gone: nothing can be awaited any more
             self.rest_at_exit()
             raise
@@ -116,8 +116,7 @@ class TickLoop:
         if (status := self._executor.status(now)) is not None:
             self._publisher.publish_to_operator(status)
 
-    async def tick_on(self) -> None:
-        """Run the ticks without end; whoever calls it brings the robot to rest afterwards. Raises RobotFailed."""
+    async def _tick_on(self) -> None:
         metronome = Ticker(self._robot.tick_seconds, time.monotonic(), catch_up=MAX_CATCH_UP)
         while True:
             await self._wait(metronome)
