@@ -10,7 +10,6 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections.abc import Iterator
 
 from lockstep.robot_bridge.control.clock import Clock
 from lockstep.robot_bridge.control.coming_to_rest import ComingToRest
@@ -106,7 +105,7 @@ class TickLoop:
         leaving.stop()
 
     def tick(self) -> None:
-        """Run one tick, and send a feedback if one is due. `Robot.prepare` follows."""
+        """Run one tick, and send a feedback if one is due."""
         now = self._now()
         feedback = self._executor.tick(now)
         if self._shaper.at_rest:
@@ -115,18 +114,18 @@ class TickLoop:
             self._publisher.publish_feedback(feedback)
         if (status := self._executor.status(now)) is not None:
             self._publisher.publish_to_operator(status)
+        self._robot.prepare()
 
     async def _tick_on(self) -> None:
         metronome = Ticker(self._robot.tick_seconds, time.monotonic(), catch_up=MAX_CATCH_UP)
         while True:
             await self._wait(metronome)
             self._counters.skipped_ticks = metronome.skipped
-            with _failing():
+            try:
                 self.tick()
                 self._liveness.ticked()
-            await asyncio.sleep(0)  # uvloop hands what was written to the kernel at the end of the loop's turn
-            with _failing():
-                self._robot.prepare()
+            except BaseException as error:  # an adapter may raise one that ends the loop or cancels the task
+                raise RobotFailed(named(error)) from error
 
     async def _wait(self, metronome: Ticker) -> None:
         """Wait for the next tick."""
@@ -164,12 +163,3 @@ class TickLoop:
 
     def _coming_to_rest(self) -> ComingToRest:
         return ComingToRest(self._robot, self._shaper, self._hold, self._now())
-
-
-@contextlib.contextmanager
-def _failing() -> Iterator[None]:
-    """Let what an adapter raises be its failure: it may raise what ends the loop or cancels the task."""
-    try:
-        yield
-    except BaseException as error:
-        raise RobotFailed(named(error)) from error
