@@ -6,10 +6,12 @@ More lines on standard input: `charge X` (NaN: unknown), `level NAME N` (of a co
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from nav_msgs.msg import OccupancyGrid
 from rclpy.callback_groups import ReentrantCallbackGroup
 from robot_node import RobotNode, main  # type: ignore[import-not-found]  # beside this file, which is run as a script
-from sensor_msgs.msg import BatteryState
-from std_msgs.msg import Bool, String
+from sensor_msgs.msg import BatteryState, Temperature
+from std_msgs.msg import Bool, Float32, Float64, Int32, String
 from std_srvs.srv import SetBool, Trigger
 
 EVERY = 0.1  # s
@@ -24,6 +26,19 @@ class ServingRobot(RobotNode):  # type: ignore[misc]
         self._modes = self.create_publisher(String, "/mode", 10)
         self._stops = self.create_publisher(Bool, "/emergency_stop", 10)
         self._pressed = False
+        self._readings = [
+            (self.create_publisher(kind, topic, 10), kind, value)
+            for kind, topic, value in (
+                (Float32, "/load", 0.25),
+                (Float64, "/depth", -3.5),
+                (Int32, "/parts", 7),
+                (Bool, "/door", True),
+            )
+        ]
+        self._heat = self.create_publisher(Temperature, "/motor_temperature", 10)
+        self._grids = self.create_publisher(OccupancyGrid, "/map", 10)
+        self._places = self.create_publisher(PoseWithCovarianceStamped, "/amcl_pose", 10)
+        self._poses = self.create_publisher(PoseStamped, "/pose", 10)
         group = ReentrantCallbackGroup()
         self.create_service(SetBool, "/light", self._light, callback_group=group)
         self.create_service(Trigger, "/beep", self._beep, callback_group=group)
@@ -58,6 +73,12 @@ class ServingRobot(RobotNode):  # type: ignore[misc]
     def _report(self) -> None:
         self._modes.publish(String(data="AUTO"))
         self._stops.publish(Bool(data=self._pressed))
+        for publisher, kind, value in self._readings:
+            publisher.publish(kind(data=value))
+        heat = Temperature(temperature=61.5)
+        heat.header.stamp = self.get_clock().now().to_msg()
+        self._heat.publish(heat)
+        self._say_place()
         battery = BatteryState()
         battery.header.stamp = self.get_clock().now().to_msg()
         battery.voltage, battery.percentage = 24.5, self._charge
@@ -66,6 +87,21 @@ class ServingRobot(RobotNode):  # type: ignore[misc]
         for name, level in self._levels.items():  # each from a node of its own, as it were
             status = DiagnosticStatus(level=bytes([level]), name=name, message="" if level == 0 else "too hot")
             self._diagnostics.publish(DiagnosticArray(status=[status]))
+
+    def _say_place(self) -> None:
+        """A map of two cells, and the robot at (3, 4) on it, turned to the left; 1 m further by the other topic."""
+        grid = OccupancyGrid(data=[0, 100])
+        grid.info.width, grid.info.height, grid.info.resolution = 2, 1, 0.5
+        grid.info.origin.orientation.w = 1.0
+        self._grids.publish(grid)
+        place = PoseStamped()
+        place.pose.position.x, place.pose.position.y = 3.0, 4.0
+        place.pose.orientation.z = place.pose.orientation.w = 0.5**0.5
+        estimated = PoseWithCovarianceStamped(header=place.header)
+        estimated.pose.pose = place.pose
+        self._places.publish(estimated)
+        place.pose.position.x = 4.0
+        self._poses.publish(place)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Services as actions, batteries and diagnostics as status: a bridge and a real ROS 2 node over DDS."""
 
 import asyncio
+import math
 import secrets
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from lockstep.protocol.actions import Act, ActionUpdate, Status, StatusItem
+from lockstep.protocol.maps import Navigation
 from lockstep.protocol.messages import Feedback
 from lockstep.robot_bridge.link.link_client import RobotLink
 from tests.robot_bridge.bridge_helpers import Operator
@@ -36,6 +38,11 @@ batteries:
 diagnostics: {most: 4}
 readings:
   - {topic: /mode, name: mode, label: Mode}
+  - {topic: /motor_temperature, name: heat, message: Temperature, warning: 60, error: 80}
+  - {topic: /load, name: load, message: Float32, unit: A}
+  - {topic: /depth, name: depth, message: Float64, unit: m}
+  - {topic: /parts, name: parts, message: Int32}
+  - {topic: /door, name: door, message: Bool}
 lockout: {topic: /emergency_stop, hardware_stop: true}
 """
 
@@ -124,6 +131,50 @@ async def test_the_battery_and_the_components_are_the_status(operator: Operator,
     await node.tell("charge nan")
     volts = await status_of(operator, lambda items: items["battery"].kind == "number")
     assert (volts["battery"].value, volts["battery"].unit) == (24.5, "V")
+
+
+async def test_temperatures_numbers_and_switches_of_topics_are_the_status(operator: Operator) -> None:
+    wanted = {"heat", "load", "depth", "parts", "door"}
+    items = await status_of(operator, lambda items: items.keys() >= wanted)
+    said = {name: (items[name].kind, items[name].value, items[name].unit, items[name].level) for name in wanted}
+    assert said == {
+        "heat": ("temperature", 61.5, "°C", "warning"),
+        "load": ("number", 0.25, "A", "ok"),
+        "depth": ("number", -3.5, "m", "ok"),
+        "parts": ("number", 7.0, "", "ok"),
+        "door": (items["door"].kind, True, "", "ok"),
+    }
+    assert items["heat"].text == "above 60"
+
+
+@pytest.mark.parametrize(
+    ("message", "topic", "x"), [("PoseWithCovarianceStamped", "/amcl_pose", 3.0), ("PoseStamped", "/pose", 4.0)]
+)
+async def test_a_pose_of_a_topic_says_where_the_robot_is_on_the_map(
+    tmp_path: Path, node: RosRobot, message: str, topic: str, x: float
+) -> None:
+    settings = tmp_path / "mapped.yaml"
+    place = f"{{source: topic, topic: {topic}, message: {message}}}"
+    settings.write_text((EXAMPLES / "base.yaml").read_text() + f"map: {{durable: false, place: {place}}}\n")
+    async with (
+        running_ros_bridge(tmp_path, node, settings) as bridge,
+        RobotLink(*bridge.address, "operator", name="test") as link,
+    ):
+        operator = Operator(link)
+        async with asyncio.timeout(PATIENCE):
+            while not (told := await operator.next(Navigation)).located:
+                pass
+            feedback = await operator.next(Feedback)
+        description = link.hello.description
+        assert description is not None
+        planar = description.map
+        assert planar is not None
+        joints = [joint.name for joint in description.joints]
+        at = [feedback.joints[joints.index(name)] for name in (planar.x, planar.y, planar.yaw)]
+    east, north, yaw = told.frame
+    assert east + at[0] * math.cos(yaw) - at[1] * math.sin(yaw) == pytest.approx(x, abs=0.01)
+    assert north + at[0] * math.sin(yaw) + at[1] * math.cos(yaw) == pytest.approx(4.0, abs=0.01)
+    assert math.remainder(yaw + at[2] - math.pi / 2, math.tau) == pytest.approx(0.0, abs=0.01)
 
 
 async def test_the_mode_and_the_hardware_stop_are_the_status_and_a_pressed_one_stops_the_robot(
