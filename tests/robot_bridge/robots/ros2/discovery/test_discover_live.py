@@ -2,7 +2,9 @@
 
 import asyncio
 import os
+import pty
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -103,6 +105,62 @@ async def test_the_file_drives_the_graph_that_it_was_written_from_without_an_edi
         code, printed = await discover(out, node.environment)
         assert (code, "is there already" in printed) == (2, True)
         assert out.read_text() == text
+
+
+async def discover_at_terminal(
+    out: Path, environment: dict[str, str], answer: Callable[[str], str]
+) -> tuple[int, list[str]]:
+    """Run the command at a terminal. `answer` is told each question. Its exit status, and the questions."""
+    master, slave = pty.openpty()
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "lockstep.robot_bridge.robots.ros2.discovery", "discover"),
+        *("--out", str(out), "--robot-python", ros_python()),
+        stdin=slave,
+        stdout=slave,
+        stderr=slave,
+        env=os.environ | {name: value for name, value in environment.items() if name != "PYTHONPATH"},
+        start_new_session=True,
+    )
+    os.close(slave)
+    said, asked = "", list[str]()
+
+    def read() -> None:
+        nonlocal said
+        try:
+            said += os.read(master, 4096).decode(errors="replace")
+        except OSError:  # the command has ended
+            asyncio.get_running_loop().remove_reader(master)
+            return
+        if said.endswith("]: "):
+            asked.append(said.splitlines()[-1])
+            os.write(master, f"{answer(asked[-1])}\n".encode())
+            said += "\n"
+
+    asyncio.get_running_loop().add_reader(master, read)
+    try:
+        async with asyncio.timeout(2 * PATIENCE):
+            code = await process.wait()
+    finally:
+        asyncio.get_running_loop().remove_reader(master)
+        os.close(master)
+    return code, asked
+
+
+async def test_a_person_at_a_terminal_is_asked_what_the_graph_does_not_say(tmp_path: Path) -> None:
+    out, guessed = tmp_path / "robot.yaml", tmp_path / "guessed.yaml"
+    async with running_ros_robot(tmp_path) as node:
+        code, asked = await discover_at_terminal(
+            out, node.environment, lambda question: "0.15" if "m/s" in question else ""
+        )
+        assert code == 0, asked
+        assert asked
+        assert (await discover(guessed, node.environment))[0] == 0
+    speeds = [question for question in asked if "m/s" in question]
+    settings, _ = read_settings(out)
+    assert settings.base is not None
+    assert len(speeds) >= 1, asked
+    assert settings.base.forward.maximum == 0.15
+    assert out.read_text().count("CHECK") < guessed.read_text().count("CHECK"), "what a person has said is no guess"
 
 
 @pytest.mark.skipif(not have_compiler(), reason="there is no compiler for the interfaces that no wheel has")
