@@ -20,8 +20,9 @@ from lockstep.robot_bridge.control.goals.pose_turns import PoseTurns
 from lockstep.robot_bridge.control.limits.goal_axis import GoalAxis
 from lockstep.robot_bridge.control.limits.rate_axis import RateAxis
 
-__all__ = ["AxisShaper", "Limiter"]
+__all__ = ["LATE_TIMER", "AxisShaper", "Limiter"]
 
+LATE_TIMER: Final = 0.002  # s by which the next tick may come late all the same; a busy machine's is later
 ROUNDING: Final = 1e-6  # unit: goals that are so close to each other are the same
 
 # (rates, what they would be under braking) -> rates nearer to rest
@@ -174,7 +175,7 @@ class AxisShaper:
     def step(self, now: float, dt: float) -> list[float]:
         """Return the values for a tick of `dt` seconds that begins now."""
         self._begins = False
-        left = self._deadline - now - dt  # what this tick applies lasts until the next one
+        left = self._deadline - now - dt - LATE_TIMER  # what this tick applies lasts until the next one
         if left <= 0:
             self._released = True
         released = self._released
