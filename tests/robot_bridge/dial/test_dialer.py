@@ -64,6 +64,10 @@ class Connection:
         self.ended = asyncio.Event()
         self.lasts = lasts
         self._admitted = admitted
+        self.pings = 0
+
+    async def ping(self) -> None:
+        self.pings += 1
 
     def carry(self, link: Any) -> None:
         if self._admitted:
@@ -111,6 +115,18 @@ async def test_an_answer_without_the_header_or_with_another_value_has_reached_th
     """An older console sends none; and what stands between may send anything."""
     monkeypatch.setattr(dialer, "OWN_LINK_ENDS", 0.0)
     assert await told(monkeypatch, caplog, lambda n: Connection(headers, False, n == 5)) == [REACHED]
+
+
+@pytest.mark.parametrize(("admitted", "pings"), [(False, 4), (True, 0)])
+async def test_a_link_pings_a_few_times_behind_its_handshake_until_it_is_admitted(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, admitted: bool, pings: int
+) -> None:
+    """So TCP learns within a round trip that a message of the handshake was lost."""
+    monkeypatch.setattr(dialer, "PING_SECONDS", 0.0)
+    monkeypatch.setattr(dialer, "MOST_PINGS", 4)
+    connection = Connection([], admitted, True)
+    await told(monkeypatch, caplog, lambda _: connection)
+    assert connection.pings == pings
 
 
 async def test_a_link_that_waits_tells_it_once_however_often_it_dials_and_then_that_it_is_there(

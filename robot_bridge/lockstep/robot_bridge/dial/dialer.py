@@ -1,9 +1,12 @@
 """Keeps a robot's two links to its console open: for commands, and for pictures and sound. Tries for ever."""
 
 import asyncio
+import contextlib
 import logging
 import random
 import ssl
+
+from websockets.exceptions import ConnectionClosed
 
 from lockstep.protocol.dial_in import OWN_LINK_ENDS, TRUSTED, WAIT_HEADER, WAITS, RobotToken
 from lockstep.protocol.messages import LinkRole
@@ -16,6 +19,7 @@ from lockstep.robot_bridge.link.link_server import LinkPeer, LinkServer
 __all__ = ["Dialer"]
 
 ROLES: tuple[LinkRole, ...] = ("operator", "media")
+PING_SECONDS, MOST_PINGS = 0.1, 30  # while a link is not admitted; a console may let it wait for long
 HEALTHY_AFTER = 5.0  # s of a link; then the next loss is followed by a try at once
 TAKEN = (
     "the console has another connection with this robot's key, and takes this one when that ends: a second robot with"
@@ -90,8 +94,10 @@ class Dialer:
             connection.carry(link)
             async with asyncio.TaskGroup() as tasks:
                 saying = tasks.create_task(self._say_reached(role, link, _waits(connection)), name=f"dialled {role}")
+                asking = tasks.create_task(_ask(connection, link), name=f"pings of {role}")
                 await connection.ended.wait()
                 saying.cancel()
+                asking.cancel()
         finally:
             connection.transport.abort()
 
@@ -123,6 +129,20 @@ class Dialer:
             _logger.warning("the %s link does not reach the console, trying on: %s", role, trouble)
         else:
             _logger.info("the %s link has reached the console at %s", role, self._access.address.url)
+
+
+async def _ask(connection: ConsoleConnection, link: LinkPeer) -> None:
+    """Ping behind the link's handshake until it is admitted.
+
+    Nothing else follows the handshake's messages, so TCP would repeat a lost one only by its timer, of half a second
+    and more on a long path. A ping and its answer show the loss on either way within a round trip.
+    """
+    with contextlib.suppress(ConnectionClosed):
+        for _ in range(MOST_PINGS):
+            await asyncio.sleep(PING_SECONDS)
+            if link.admitted.is_set():
+                return
+            await connection.ping()
 
 
 def _waits(connection: ConsoleConnection) -> bool:
