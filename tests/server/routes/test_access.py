@@ -463,7 +463,7 @@ async def test_a_disk_that_hangs_holds_up_no_revocation(monkeypatch: pytest.Monk
             async with asyncio.timeout(PATIENCE):
                 await peer.closed.wait()
             assert (await rig.http.get("/api/session", headers=headers)).json()["error"] == "link_revoked"
-            assert hangs.is_set()
+            assert await asyncio.to_thread(hangs.wait, PATIENCE)
             assert not ends.is_set()
         finally:
             ends.set()

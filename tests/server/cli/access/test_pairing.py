@@ -7,9 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
 from lockstep.bench.harness.processes import running_process
 from lockstep.bench.harness.stack import LOCKSTEP
+from lockstep.server.cli.access import pairing as pairing_commands
+from lockstep.server.cli.main import app
 from tests.server.cli.test_console_request import answering, lockstep
 from tests.support.stack import Stack, running_console, running_stack
 from tests.waiting import PATIENCE
@@ -205,3 +208,28 @@ async def test_an_answer_that_is_none_of_a_console_is_said_to_be_and_is_no_fault
     assert status == 2, errors
     assert "Traceback" not in errors
     assert "console" in errors
+
+
+def pairing(state: str, key: str = "") -> dict[str, Any]:
+    return {"key": key, "robot": "desk", "pairing": {"state": state}}
+
+
+@pytest.mark.parametrize(
+    ("answers", "code"),
+    [
+        ([pairing("waiting"), pairing("paired"), pairing("paired"), pairing("paired", "paired")], 0),
+        ([pairing("waiting"), pairing("expired")], 1),
+        ([pairing("paired")] * 4, 1),
+    ],
+)
+def test_who_waits_for_a_robot_waits_until_its_key_is_stored(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, answers: list[dict[str, Any]], code: int
+) -> None:
+    """A robot has used the code; the console's disk takes the key a while later, or never."""
+    given = iter([{"command": "lockstep robot", "seconds": 600.0, "tries": 5}, *answers])
+    monkeypatch.setattr(pairing_commands, "ask_console", lambda *_: next(given))
+    monkeypatch.setattr(pairing_commands, "LOOK_SECONDS", 0.0)
+    monkeypatch.setattr(pairing_commands, "STORED_LOOKS", 3)
+    done = CliRunner().invoke(app, ["pair", "--wait", "--state-dir", str(tmp_path)])
+    assert done.exit_code == code, done.output
+    assert ("desk is paired" in done.stderr) == (code == 0)

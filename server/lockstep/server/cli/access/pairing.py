@@ -21,6 +21,7 @@ __all__ = ["add_pairing_commands"]
 
 EXIT_UNPAIRED = 1
 LOOK_SECONDS = 1.0
+STORED_LOOKS = 30  # until a key that a robot has got by the code is on the console's disk
 NOT_ELSEWHERE = (
     "warning: {host} in this command is the robot's own computer, so only a robot on the console's machine can dial it."
     " Start the console with --public-url (LOCKSTEP_PUBLIC_URL), the address by which robots reach it, and with --host"
@@ -156,7 +157,7 @@ def _loopback_host(command: str) -> str:
 
 def _is_paired(ask: Ask) -> bool:
     """Wait until a robot has used the code, or the code has ended. Says of robots that are refused meanwhile."""
-    said = ""
+    said, stored = "", STORED_LOOKS
     while True:
         found = read_answer(_DialIn, ask("GET", "/api/dial-in"))
         if found.key == "paired":
@@ -165,7 +166,8 @@ def _is_paired(ask: Ask) -> bool:
         if found.pairing.refused and found.pairing.refused != said:
             said = found.pairing.refused
             typer.echo(f"lockstep: a robot was refused: {escaped(said)}", err=True)
-        if found.pairing.state != "waiting":
+        stored -= found.pairing.state == "paired"  # a disk may take a while to take the key
+        if found.pairing.state not in ("waiting", "paired") or stored < 0:
             typer.echo("lockstep: no robot was paired: the code has ended", err=True)
             return False
         time.sleep(LOOK_SECONDS)
