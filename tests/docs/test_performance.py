@@ -56,7 +56,8 @@ def test_a_run_beside_the_benchmark_names_its_day_its_command_and_its_machine(pa
     assert kept["command"].startswith("python -m lockstep.bench.")
     assert not re.search("[ =]/", kept["command"]), "a path of one machine"
     assert kept["machine"].keys() >= MACHINE_KEYS
-    assert kept["busy_percent"] <= 8, "too much else went on to keep the figures"
+    # In `arms` counts what was put where, and which event each picture shows, whatever else the machine does.
+    assert kept["busy_percent"] <= 8 or path.parent.name == "arms", "too much else went on to keep the figures"
     assert kept["runs"]
 
 
