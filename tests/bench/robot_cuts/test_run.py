@@ -3,7 +3,8 @@
 import pytest
 
 from lockstep.bench.experiment.judge.outage_judge import Cut, Finding
-from lockstep.bench.robot_cuts.run import Way, figures, run_cuts, with_silence
+from lockstep.bench.robot_cuts.cuts import figures, with_silence
+from lockstep.bench.robot_cuts.run import Way, run_cuts
 from lockstep.emulator.errors import NamespacesUnavailable
 from lockstep.emulator.namespace.namespaces import ROBOT_ADDRESS
 from lockstep.emulator.namespace.tun import open_tun
@@ -27,6 +28,11 @@ def test_a_robot_that_never_rested_or_came_back_has_no_worst_figure() -> None:
     found = figures([finding(), finding(rest_seconds=None, control_seconds=None)])
     assert (found["rest_ms_worst"], found["back_ms_worst"]) == (None, None)
     assert (found["rested_within_hold"], found["back_within_2_s"]) == (1, 1)
+
+
+def test_the_age_of_intentions_is_unknown_where_none_were_written_down() -> None:
+    assert figures([finding(oldest_intention=None)])["oldest_intention_ms"] is None
+    assert figures([finding(oldest_intention=None), finding()])["oldest_intention_ms"] == 100.0
 
 
 def test_outages_of_the_path_s_own_until_control_is_back_are_told() -> None:

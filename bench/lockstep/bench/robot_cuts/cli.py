@@ -12,7 +12,8 @@ import typer
 
 from lockstep.bench.figures.kept_run import kept_run
 from lockstep.bench.figures.machine import busy_percent
-from lockstep.bench.robot_cuts.run import figures, run_cuts
+from lockstep.bench.robot_cuts.cuts import figures
+from lockstep.bench.robot_cuts.run import run_cuts
 
 __all__ = ["app"]
 

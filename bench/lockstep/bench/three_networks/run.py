@@ -5,6 +5,7 @@ import datetime
 import json
 import subprocess
 import sys
+import time
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
@@ -13,9 +14,12 @@ from tempfile import TemporaryDirectory
 from typing import Any
 from urllib.parse import urlsplit
 
+from lockstep.bench.experiment.judge.outage_judge import Cut
 from lockstep.bench.harness.event_log import records
 from lockstep.bench.harness.processes import started
 from lockstep.bench.harness.stack import LOCKSTEP
+from lockstep.bench.robot_cuts.cuts import cut_once, judged, until_driven
+from lockstep.bench.robot_cuts.cuts import figures as cut_figures
 from lockstep.emulator import load_profile
 from lockstep.emulator.namespace.three_sites import CONSOLE, Site, ThreeSites
 from lockstep.server.http.transport.tls import self_signed
@@ -28,12 +32,20 @@ PAGE_SECONDS = 240.0  # for the page to open, to drive and to say what it saw, b
 
 
 async def run(
-    robot: str, page: str, seconds: float, seed: int, say: Callable[[str], None], *, settle: float = SETTLE
+    robot: str,
+    page: str,
+    seconds: float,
+    seed: int,
+    say: Callable[[str], None],
+    *,
+    cuts: int = 0,
+    settle: float = SETTLE,
 ) -> dict[str, Any]:
     """Pair, open the page and drive for `seconds`; return what was seen.
 
     Args:
         robot, page: profiles of their networks
+        cuts: how often the robot's network is cut, `seconds` each time; 0 for a drive without cuts
         settle: s of driving before those, in which the bitrate finds its measure
 
     Raises:
@@ -72,19 +84,29 @@ async def run(
                     *("--event-log", str(log), "--state-dir", str(folder / "bridge")),
                 ]
                 async with started(bridge, spawn=partial(sites.start, "robot")):
-                    driving = [
-                        sys.executable,
-                        "-m",
-                        "lockstep.bench.three_networks.page",
-                        _outside(links["operator"]),
-                        str(seconds),
-                        str(settle),
-                    ]
-                    async with asyncio.timeout(PAGE_SECONDS + seconds):
-                        seen = json.loads(await _output(sites, "page", driving))
+                    cut, seen = await _driven(sites, _outside(links["operator"]), log, cuts, seconds, settle, say)
                     say("the page has driven")
             found = list(records(log))
-        return _figures(seen, found, sites.router.refused)
+        told = cut_figures(judged(found, cut, partial(sites.planned_silence, "robot"))) if cuts else {}
+        return {**told, **_figures(seen, found, sites.router.refused)}
+
+
+async def _driven(
+    sites: ThreeSites, link: str, log: Path, cuts: int, seconds: float, settle: float, say: Callable[[str], None]
+) -> tuple[list[Cut], dict[str, Any]]:
+    """Let the page drive; return the cuts, and what the page says that it saw."""
+    command = [sys.executable, "-m", "lockstep.bench.three_networks.page", link, str(settle)]
+    if not cuts:
+        async with asyncio.timeout(PAGE_SECONDS + seconds):
+            return [], json.loads(await _output(sites, "page", [*command, str(seconds)]))
+    process = await sites.start("page", command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    await until_driven(log, time.monotonic())
+    await asyncio.sleep(settle)
+    cut = partial(sites.outage, "robot")
+    made = [await cut_once(log, cut, seconds, number, say) for number in range(cuts)]
+    async with asyncio.timeout(PAGE_SECONDS):
+        output, _ = await process.communicate(b"")  # and end its input
+    return made, json.loads(output)
 
 
 def _outside(link: str) -> str:
