@@ -9,7 +9,6 @@ from typing import Any, cast
 import pytest
 
 from lockstep.robot_bridge.robots.navigation import PlanarPose
-from lockstep.robot_bridge.robots.ros2.mapping import map_topics
 from lockstep.robot_bridge.robots.ros2.mapping.map_topics import BadMap, MapReader, grid_of
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 from lockstep.robot_bridge.robots.ros2.settings import MapPlace, MapTopics
@@ -34,7 +33,7 @@ class Topics:
 def now(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     """The time, s, of the bridge's clock."""
     found = SimpleNamespace(seconds=100.0)
-    monkeypatch.setattr(map_topics.clock, "now", lambda: found.seconds)
+    monkeypatch.setattr("lockstep.robot_bridge.control.clock.now", lambda: found.seconds)
     return found
 
 
