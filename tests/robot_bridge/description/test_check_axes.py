@@ -62,10 +62,10 @@ def test_it_makes_sense(description: RobotDescription) -> None:
     ("brake", "settling", "tick", "fits"),
     [
         (5.0, 0.0, 0.01, True),
-        (5.0, 0.0, 0.1, True),
-        (5.0, 0.0, 0.11, False),
+        (5.0, 0.0, 0.098, True),
+        (5.0, 0.0, 0.099, False),  # a tick may come 2 ms late
         (15.0, 0.2, 0.01, False),
-        (1e6, 0, 0.3, False),
+        (1e6, 0, 0.298, False),
     ],
 )
 def test_each_axis_has_to_be_at_rest_by_the_last_tick_within_hold(

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable
 
 from lockstep.protocol.description import Axis, Pose, RobotDescription
+from lockstep.robot_bridge.control.limits.axis_shaper import LATE_TIMER
 from lockstep.robot_bridge.errors import DescriptionError
 
 __all__ = ["check_axes", "check_braking"]
@@ -36,6 +37,8 @@ def check_axes(description: RobotDescription) -> None:
 def check_braking(description: RobotDescription, tick_seconds: float) -> None:
     """Check that each axis can keep its full speed: it has to be at rest by the last control tick within `hold`.
 
+    That tick leaves room for the next one, and for a late timer.
+
     Raises:
         DescriptionError: names the first axis that cannot.
     """
@@ -43,10 +46,12 @@ def check_braking(description: RobotDescription, tick_seconds: float) -> None:
     for axis in description.axes:
         fastest = axis.slew if axis.kind == "goal" else max(axis.maximum - axis.rest, axis.rest - axis.minimum)
         taken = fastest / axis.brake + settling.get(axis.name, 0.0)
-        if tick_seconds >= description.hold or taken + tick_seconds > description.hold + ROUNDING:
+        until_next = tick_seconds + LATE_TIMER
+        if until_next >= description.hold or taken + until_next > description.hold + ROUNDING:
             raise DescriptionError(
-                f"axis {axis.name}: coming to rest takes {taken:.3f} s, and a control tick {tick_seconds:g} s: together"
-                f" longer than hold ({description.hold:g} s); raise brake or lower the limits"
+                f"axis {axis.name}: coming to rest takes {taken:.3f} s, a control tick {tick_seconds:g} s, which may be"
+                f" {LATE_TIMER:g} s late: together longer than hold ({description.hold:g} s); raise brake or lower"
+                " the limits"
             )
 
 
