@@ -8,6 +8,7 @@ import ssl
 from collections.abc import Callable
 from functools import partial
 
+from lockstep.robot_bridge.link.accepting import accepted, readable
 from lockstep.robot_bridge.link.applicants import Applicants
 from lockstep.robot_bridge.link.known_addresses import KnownAddresses
 
@@ -143,12 +144,11 @@ class LinkAcceptor:
             self._listener.close()
 
     async def _accept(self) -> None:
-        loop = asyncio.get_running_loop()
         async with asyncio.TaskGroup() as tasks:
             while True:
                 await self._accepts.take()
                 try:
-                    connection, address = await loop.sock_accept(self._listener)
+                    connection, address = await accepted(self._listener)
                 except OSError:
                     await asyncio.sleep(PAUSE)
                     continue
@@ -211,28 +211,18 @@ async def _first_record(connection: socket.socket) -> None:
         OSError: no record arrived in time.
     """
     async with asyncio.timeout(SILENCE):
-        await _readable(connection, TLS_HEADER)
+        await _has_bytes(connection, TLS_HEADER)
         header = connection.recv(TLS_HEADER, socket.MSG_PEEK)
         length = int.from_bytes(header[3:])
         if len(header) < TLS_HEADER or length > MAX_HELLO:
             raise ConnectionAbortedError("no TLS")
-        await _readable(connection, TLS_HEADER + length)
+        await _has_bytes(connection, TLS_HEADER + length)
 
 
-async def _readable(connection: socket.socket, count: int) -> None:
+async def _has_bytes(connection: socket.socket, count: int) -> None:
     """Wait until `count` bytes are there, or the connection has ended."""
-    loop = asyncio.get_running_loop()
-    came = loop.create_future()
-
-    def readable() -> None:
-        loop.remove_reader(connection)
-        if not came.done():
-            came.set_result(None)
-
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVLOWAT, count)
-    loop.add_reader(connection, readable)
     try:
-        await came
+        await readable(connection)
     finally:
-        loop.remove_reader(connection)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVLOWAT, 1)

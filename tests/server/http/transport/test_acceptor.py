@@ -19,6 +19,7 @@ class _Places(ConnectionPlaces):
         self.came: asyncio.Queue[tuple[str, bool]] = asyncio.Queue()
         self.are_taken = False  # by who has just come
         self.looked = asyncio.Event()
+        self.closes_at_once = False
 
     def wait(self, now: float) -> float:
         self.looked.set()
@@ -26,6 +27,8 @@ class _Places(ConnectionPlaces):
 
     def enter(self, address: str, close: Callable[[], None], now: float, *, proxy: bool = False) -> Place:
         self.came.put_nowait((address, proxy))
+        if self.closes_at_once:
+            asyncio.get_running_loop().call_soon(close)
         return super().enter(address, close, now, proxy=proxy)
 
 
@@ -78,6 +81,22 @@ async def test_a_newcomer_waits_outside_while_who_has_just_come_had_no_time_to_s
             assert places.came.empty()
             places.are_taken = False
             await places.came.get()
+        writer.transport.abort()
+        accepting.cancel()
+        await asyncio.wait([accepting])
+
+
+async def test_a_connection_that_is_given_up_before_it_begins_is_closed_and_has_no_place() -> None:
+    places = _Places()
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        listener.setblocking(False)
+        acceptor = Acceptor(listener, places, FairQueue(), PlacedProtocol, None)
+        accepting = asyncio.create_task(acceptor.run())
+        places.closes_at_once = True
+        reader, writer = await asyncio.open_connection(*listener.getsockname()[:2])
+        async with asyncio.timeout(20):
+            assert await reader.read() == b""
+        assert len(places) == 0
         writer.transport.abort()
         accepting.cancel()
         await asyncio.wait([accepting])

@@ -6,6 +6,7 @@ import socket
 import ssl
 from collections.abc import Callable
 
+from lockstep.robot_bridge.link.accepting import accepted
 from lockstep.server.http.transport.client_address import counted_address
 from lockstep.server.http.transport.connection_places import ConnectionPlaces, Place
 from lockstep.server.util.fair_queue import FairQueue
@@ -51,11 +52,10 @@ class Acceptor:
         strangers' requests wait, it has its turn: a client that comes to send STOP is a stranger until its connection
         has begun.
         """
-        loop = asyncio.get_running_loop()
         async with asyncio.TaskGroup() as tasks:
             while True:
                 try:
-                    connection, address = await loop.sock_accept(self._listener)
+                    connection, address = await accepted(self._listener)
                 except OSError as error:
                     if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM):
                         self._places.on_refused("no_descriptors")
@@ -111,29 +111,32 @@ class _Beginning:
         self._connection = connection
         now, proxy = asyncio.get_running_loop().time(), address in PROXIES
         self._place = acceptor.places.enter(counted_address(address), self._close, now, proxy=proxy)
+        self._is_handed_over = self._is_connected = False
         self._task: asyncio.Task[None] | None = None
         if self._place.group is None:
             connection.close()
         else:
             self._task = tasks.create_task(self._begin(), name="connection")
+            self._task.add_done_callback(self._ended)  # also of a task that is cancelled before its first step
 
     def _close(self) -> None:
         if self._task is not None:
             self._task.cancel()
 
     async def _begin(self) -> None:
-        loop, connected, handed_over = asyncio.get_running_loop(), False, False
         try:
             protocol = self._acceptor.protocol_at(self._place)
-            handed_over = True
+            self._is_handed_over = True
             await self._acceptor.connect(self._connection, protocol)
-            connected = True
+            self._is_connected = True
         except (OSError, TimeoutError):
             self._acceptor.places.on_refused("no_handshake")
         except Exception as error:
+            loop = asyncio.get_running_loop()
             loop.call_exception_handler({"message": "a connection could not start", "exception": error})
-        finally:
-            if not handed_over:
-                self._connection.close()
-            if not connected:
-                self._acceptor.places.leave(self._place)
+
+    def _ended(self, task: asyncio.Task[None]) -> None:
+        if not self._is_handed_over:
+            self._connection.close()
+        if not self._is_connected:
+            self._acceptor.places.leave(self._place)
