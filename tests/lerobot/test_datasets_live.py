@@ -3,6 +3,7 @@
 import asyncio
 import json
 import os
+import shutil
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 import pytest_asyncio
 
 from lockstep.client import Console
+from lockstep.server.cli.recordings.follow import append_once
 from lockstep.server.recording.dataset import appending
 from lockstep.server.recording.dataset.commit import commit
 from lockstep.server.recording.export import export_lerobot
@@ -22,6 +24,7 @@ from tests.lerobot.commands import ROOT, environment, lerobot_python, run_lerobo
 from tests.lerobot.sessions import PATIENCE, drive, following, recorded_stack, so101_joints, so101_tool
 from tests.server.recording.dataset.growing_file import GrowingFile
 from tests.server.recording.dataset.test_appending import FILES, Killed, follower, killed_after
+from tests.server.recording.episodes.test_edited_datasets import change
 from tests.server.recording.test_episode_export import KEPT_AND_NOT
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(2400)]
@@ -123,6 +126,28 @@ async def test_the_dataset_that_grew_meanwhile_has_the_kept_episodes_alone_and_e
     gaps = [event - stamp for event, stamps in zip(seen["events"], seen["stamps"], strict=True) for stamp in stamps]
     assert min(gaps) >= 0
     assert max(gaps) <= TOLERANCE
+
+
+async def test_after_an_episode_is_discarded_late_lerobot_loads_what_is_left_and_each_picture_is_its_rows(
+    session: Session, tmp_path: Path
+) -> None:
+    """Of a dataset with a file for each episode, and of one in which the episodes share a file."""
+    recordings = [Path(shutil.copy(path, tmp_path)) for path in session.recordings]
+    grown = shutil.copytree(session.grown, tmp_path / "grown")
+    options = DatasetOptions(fps=FPS)
+    (shared,) = export_lerobot.export_all(recordings, tmp_path / "shared", options)
+    (path,) = recordings
+    change(path, {"episode": session.kept[0], "dropped": True})
+    for root in (grown, shared):
+        said: list[str] = []
+        append_once(recordings, root, options, said.append)
+        assert said[0].endswith(f"was discarded, and is taken out of {root.name}, which has 1 left")
+        verdict = verify_dataset(root, pixels=True, recordings=tmp_path)
+        assert verdict.ok, verdict
+        seen = await used(tmp_path, "load", root)
+        assert (seen["episodes"], seen["frames"]) == (1, verdict.rows)
+        assert (seen["task"], set(seen["episode"])) == ("move the tool", {0})
+        assert seen["drawn"] == seen["stamps"]
 
 
 async def test_the_joints_lead_the_arm_whoever_moved_them(session: Session, tmp_path: Path) -> None:

@@ -11,17 +11,25 @@ __all__ = ["drive_until_moved"]
 
 SHARE = 0.3  # of the first axis' largest speed
 MOVED = 0.01  # of the unit of any joint
+LONGEST = 60.0  # s, until it moves
 
 
 async def drive_until_moved(link: str) -> int:
-    """Drive the first axis until a joint has moved; return the event in which it had."""
+    """Drive the first axis until a joint has moved; return the event in which it had.
+
+    Raises:
+        TimeoutError: none moves; with what the robot says of itself.
+    """
     async with Console(link, video=False, audio=False, name="first drive") as console:
         await console.take_seat()
         axes = console.description.axes
         speed = axis_values(axes, {0: SHARE * axes[0].maximum})
         first = last = await drive_on(console, axis_values(axes, {}))
+        end = asyncio.get_running_loop().time() + LONGEST
         while max(abs(now - then) for now, then in zip(last.joints, first.joints, strict=True)) < MOVED:
             last = await drive_on(console, speed)
+            if asyncio.get_running_loop().time() > end:
+                raise TimeoutError(f"nothing moved in {LONGEST:g} s: {last}, {console.stats()}")
         await console.rest()
         return last.event
 

@@ -12,7 +12,6 @@ from lockstep.server.recording.episodes.edits import edits_path
 from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.export.export_lerobot import DatasetOptions
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
-from tests.server.recording.dataset.test_appending import events_of, follower
 from tests.server.recording.episodes.test_edited_datasets import NEXT, change
 from tests.server.recording.makers import INFO
 from tests.server.recording.test_episode_export import KEPT_AND_NOT, episode, recording
@@ -106,16 +105,3 @@ def test_a_whole_recording_that_turns_out_to_have_episodes_is_named(tmp_path: Pa
     path.unlink()
     recording(path, *KEPT_AND_NOT[:6], events=70)
     assert differences(root, folder) == [f"all of {ID}: the recording has episodes"]
-
-
-def test_a_follower_says_once_that_a_discarded_episode_stays_in_the_dataset(tmp_path: Path) -> None:
-    """Also when the recording does not grow any more."""
-    path, root = recording(tmp_path / "a.mcap", *KEPT_AND_NOT[:6]), tmp_path / "dataset"
-    said: list[str] = []
-    following = follower(root, said)
-    assert following.look([path]) == 2
-    said.clear()
-    change(path, {"episode": "a", "dropped": True})
-    assert [following.look([path]), following.look([path])] == [0, 0]
-    assert said == ["episode a of a.mcap was discarded, and stays in dataset"]
-    assert events_of(root) == [[*range(10, 20)], [*range(45, 60)]]

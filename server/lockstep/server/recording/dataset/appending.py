@@ -17,6 +17,7 @@ from lockstep.server.recording.export.lerobot_batch import DatasetState, noted_w
 from lockstep.server.recording.export.lerobot_layout import DatasetLayout
 from lockstep.server.recording.export.lerobot_meta import DatasetNotes
 from lockstep.server.recording.export.lerobot_rows import EpisodeRows
+from lockstep.server.recording.export.unfinished import remove_stale
 
 __all__ = ["alone_with", "append", "is_dataset", "note_without_rows", "read_state"]
 
@@ -31,7 +32,9 @@ def is_dataset(root: Path) -> bool:
 
 @contextmanager
 def alone_with(root: Path) -> Iterator[Path]:
-    """Hold a dataset's lock, a file beside it, so that one process appends to it. An interrupted append is completed.
+    """Hold a dataset's lock, a file beside it, so that one process changes it.
+
+    An interrupted append is completed, and what an interrupted removal has left beside the dataset is deleted.
 
     Yields:
         the file, which the holder may write
@@ -49,6 +52,8 @@ def alone_with(root: Path) -> Iterator[Path]:
         except BlockingIOError as error:
             raise DatasetRefused(f"another process appends to {root.name}") from error
         recover(root)
+        place = root.resolve()
+        remove_stale(place.parent, place.name)
         yield lock
     finally:
         os.close(number)

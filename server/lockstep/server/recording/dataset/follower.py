@@ -11,6 +11,7 @@ from lockstep.protocol.description import RobotDescription
 from lockstep.server.recording.dataset.appending import append, is_dataset, note_without_rows, read_state
 from lockstep.server.recording.dataset.commit import recover
 from lockstep.server.recording.dataset.growing import GrowingRecording
+from lockstep.server.recording.dataset.removing import remove
 from lockstep.server.recording.episodes.edit_rules import apply_edits
 from lockstep.server.recording.episodes.edits import edits_version, read_edits
 from lockstep.server.recording.errors import DatasetRefused, RecordingError
@@ -53,14 +54,14 @@ class _File:
         edits: version of the changes that were taken into account
         again: it has an episode that could not be written
         passed: stretches that have been said not to fit
-        discarded: episodes that have been said to stay in the dataset
+        staying: episodes that have been said to stay in the dataset though they were discarded
     """
 
     growing: GrowingRecording
     edits: tuple[int, int, int] | None = None
     again: bool = False
     passed: set[Key] = field(default_factory=set)
-    discarded: set[Key] = field(default_factory=set)
+    staying: set[Key] = field(default_factory=set)
 
 
 class DatasetFollower:
@@ -138,7 +139,9 @@ class DatasetFollower:
         growing = file.growing
         recorded = growing.index.episodes
         episodes = apply_edits(recorded, read_edits(growing.path)).episodes
-        self._name_discarded(file, [each.entry for each in episodes if each.entry.state == "discarded"])
+        for each in episodes:
+            if each.entry.state == "discarded":
+                self._take_out(file, each.entry)
         is_whole = not recorded and self._wholes is not None and self._wholes.get(growing.path) == ""
         if not is_whole and not any(each.entry.state == "kept" and each.entry.ended >= since for each in episodes):
             return 0
@@ -147,17 +150,28 @@ class DatasetFollower:
             new = (each for each in stretches if each.ended >= since and self._is_new(file, each))
             return sum(self._append(reader, each, file) for each in new)
 
-    def _name_discarded(self, file: _File, discarded: Sequence[EpisodeEntry]) -> None:
-        """Say once of each episode that was discarded after it was appended that the dataset has it."""
-        growing = file.growing
-        noted = [] if self._state is None else self._state.notes.episodes
-        part = growing.index.recording, growing.index.part, growing.index.epoch
-        names = {each.episode for each in noted if (each.recording, each.part, each.epoch) == part}
-        for each in discarded:
-            key = (each.id, each.first_event, each.last_event)
-            if each.id in names and key not in file.discarded:
-                file.discarded.add(key)
-                self._say(f"episode {each.id} of {growing.path.name} was discarded, and stays in {self._root.name}")
+    def _take_out(self, file: _File, entry: EpisodeEntry) -> None:
+        """Take what the dataset has of a discarded episode out of it, under whatever id it has it."""
+        state, index = self._state, file.growing.index
+        key = entry.id, entry.first_event, entry.last_event
+        if state is None or key in file.staying:
+            return
+        events = index.recording, index.epoch, entry.first_event, entry.last_event
+        found = [number for number, each in enumerate(state.notes.episodes) if each.shared(*events)]
+        if not found:
+            return
+        name = f"episode {entry.id} of {file.growing.path.name} was discarded"
+        try:
+            self._state = remove(self._root, state, found)
+        except RecordingError as error:
+            file.staying.add(key)
+            self._say(f"{name}, and stays in {self._root.name}: {error}")
+        except OSError as error:
+            file.again = True
+            self._say(f"{name}, {self._root.name} cannot be written, and is tried again: {error}")
+        else:
+            left = 0 if self._state is None else len(self._state.notes.episodes)
+            self._say(f"{name}, and is taken out of {self._root.name}, which has {left} left")
 
     def _is_new(self, file: _File, stretch: Stretch) -> bool:
         found = None if self._state is None else present(self._state.notes.episodes, stretch)

@@ -29,9 +29,19 @@ from lockstep.server.recording.export.lerobot_meta import (
 from lockstep.server.recording.export.lerobot_rows import EpisodeRows
 from lockstep.server.recording.export.lerobot_video import ExportedCamera, write_video
 
-__all__ = ["DatasetState", "noted", "noted_without_rows", "write_batch", "write_notes"]
+__all__ = [
+    "METADATA",
+    "DatasetState",
+    "noted",
+    "noted_without_rows",
+    "write_batch",
+    "write_metadata",
+    "write_notes",
+    "write_table",
+]
 
 Array = npt.NDArray[Any]
+METADATA = ("meta/tasks.parquet", "meta/stats.json", "meta/lockstep.json", "meta/info.json")  # of all episodes
 SUCCESS = {"success": 1, "failure": 0, "": -1}
 
 
@@ -71,11 +81,10 @@ def write_batch(stage: Path, state: DatasetState, layout: DatasetLayout, episode
         raise DatasetRefused("the episodes have other columns than the dataset")
     places = _places(episodes, parts, cameras, state.info.get("total_frames", 0), batch)
     data, episodes_file = f"data/{file_of(batch)}.parquet", f"meta/episodes/{file_of(batch)}.parquet"
-    _write_table(stage / data, pa.table({name: _arrow(values) for name, values in columns.items()}))
-    _write_table(stage / "meta/tasks.parquet", tasks_table(state.tasks))
+    write_table(stage / data, pa.table({name: _arrow(values) for name, values in columns.items()}))
     count = state.info.get("total_episodes", 0)
     keys = [camera.key for camera in cameras]
-    _write_table(stage / episodes_file, episodes_table(places, count, state.fps, keys))
+    write_table(stage / episodes_file, episodes_table(places, count, state.fps, keys))
     frames = state.info.get("total_frames", 0) + sum(len(each.frames) for each in episodes)
     state.statistics = _all_statistics(state, places)
     state.info = info_of(state.robot, features, frames, state.fps, count + len(episodes), len(state.tasks))
@@ -87,12 +96,18 @@ def write_batch(stage: Path, state: DatasetState, layout: DatasetLayout, episode
         episodes=[*state.notes.episodes, *map(noted, episodes)],
         without_rows=_others(state.notes.without_rows, episodes),
     )
+    write_metadata(stage, state)
+    videos = [f"videos/{key}/{file_of(batch)}.mp4" for key in keys]
+    *first, info = METADATA
+    return [*videos, data, *first, episodes_file, info]
+
+
+def write_metadata(stage: Path, state: DatasetState) -> None:
+    """Write the files `METADATA` under `stage`. Raises OSError."""
+    write_table(stage / "meta/tasks.parquet", tasks_table(state.tasks))
     _write_json(stage / "meta/stats.json", state.statistics)
     write_notes(stage, state.notes)
     _write_json(stage / "meta/info.json", state.info)
-    videos = [f"videos/{key}/{file_of(batch)}.mp4" for key in keys]
-    meta = ["meta/tasks.parquet", "meta/stats.json", "meta/lockstep.json", episodes_file, "meta/info.json"]
-    return [*videos, data, *meta]
 
 
 def noted_without_rows(notes: DatasetNotes, episodes: Sequence[EpisodeRows]) -> DatasetNotes:
@@ -232,7 +247,8 @@ def _arrow(values: Array) -> pa.Array:
     return pa.FixedSizeListArray.from_arrays(pa.array(values.reshape(-1)), values.shape[1])
 
 
-def _write_table(path: Path, table: pa.Table) -> None:
+def write_table(path: Path, table: pa.Table) -> None:
+    """Write a table into a new file. Raises OSError."""
     path.parent.mkdir(parents=True, exist_ok=True)
     pq.write_table(table, path)
 

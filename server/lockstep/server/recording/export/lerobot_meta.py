@@ -1,7 +1,7 @@
 """The metadata of a LeRobot dataset, version 3: info, statistics, tasks, episodes. No I/O."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Literal, NamedTuple
 
 import msgspec
@@ -26,6 +26,7 @@ __all__ = [
     "info_of",
     "merged_statistics",
     "picture_statistics",
+    "place_of",
     "statistics_of",
     "tasks_table",
 ]
@@ -85,7 +86,8 @@ class DatasetNotes(msgspec.Struct, frozen=True, kw_only=True):
     sampling: str = EVENTS
     has_rate: bool = False  # the dataset has a rate of its own, and an event may be in several rows
     tolerance: int  # events
-    batches: int = 1  # number of files of each kind
+    batches: int = 1  # number of files of each kind, those that are gone included
+    gone: list[int] = []  # numbers of the files that were deleted, with the episodes in them
     cameras: list[str]  # in the order of `lockstep.stamp`
     topics: list[str] = []  # of the cameras in recordings, in the same order
     drivers: list[str] = []  # names of all that drove
@@ -97,6 +99,13 @@ class DatasetNotes(msgspec.Struct, frozen=True, kw_only=True):
     )
     episodes: list[DatasetEpisode]
     without_rows: list[DatasetEpisode] = []  # kept episodes that are not in the dataset, since none of them is a row
+
+    @property
+    def files(self) -> Iterator[str]:
+        """The names of the files of each kind, without suffixes, in the order of their rows. Whoever wrote the notes
+        may have written any number: end at the first one that is not there."""
+        gone = set(self.gone)
+        return (file_of(batch) for batch in range(self.batches) if batch not in gone)
 
 
 class EpisodePlace(NamedTuple):
@@ -165,7 +174,13 @@ def merged_statistics(parts: Sequence[Statistics]) -> Statistics:
 
 def file_of(batch: int) -> str:
     """Return the name of a batch's files, without a suffix."""
-    return f"chunk-{batch // CHUNKS:03d}/file-{batch % CHUNKS:03d}"
+    chunk, file = place_of(batch)
+    return f"chunk-{chunk:03d}/file-{file:03d}"
+
+
+def place_of(batch: int) -> tuple[int, int]:
+    """Return the numbers of a batch's folder, and of its files in it."""
+    return divmod(batch, CHUNKS)
 
 
 def tasks_table(tasks: Sequence[str]) -> pa.Table:
@@ -186,7 +201,7 @@ def episodes_table(episodes: Sequence[EpisodePlace], first: int, fps: int, video
 
 
 def _episode_row(number: int, episode: EpisodePlace, fps: int, videos: list[str]) -> dict[str, Any]:
-    chunk, file = divmod(episode.batch, CHUNKS)
+    chunk, file = place_of(episode.batch)
     length = episode.end - episode.begin
     row: dict[str, Any] = {
         "episode_index": number,

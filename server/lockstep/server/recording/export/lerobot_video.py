@@ -1,8 +1,10 @@
 """The video of a camera in a LeRobot dataset: one picture for each row, encoded anew, some episodes into one file."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from fractions import Fraction
+from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,12 +18,13 @@ from lockstep.server.recording.format.topics import CAMERA
 from lockstep.server.recording.reading.pictures import RecordedPictures
 from lockstep.server.recording.reading.reader import RecordingReader
 
-__all__ = ["ExportedCamera", "camera_key", "write_video"]
+__all__ = ["ExportedCamera", "camera_key", "copy_pictures", "write_video"]
 
 SAMPLES = 200  # pictures of a camera and an episode for its statistics
 PIXEL_STEP = 4  # between the pixels that are used, in both directions
 # A keyframe every second picture, since training reads pictures in any order. One thread: somebody may be driving.
 OPTIONS = {"crf": "23", "preset": "veryfast", "g": "2", "bf": "0", "threads": "1"}
+AGAIN = OPTIONS | {"crf": "17"}  # for pictures that were encoded like that before: nothing is lost that one could see
 
 Array = npt.NDArray[Any]
 
@@ -72,32 +75,61 @@ def write_video(
     Args:
         size: pixels, width and height of the dataset's pictures; None: those of the first one
     """
-    target.parent.mkdir(parents=True, exist_ok=True)
     pixels: list[Array] = []
-    number = 0
-    with av.open(str(target), "w") as output:
-        stream = output.add_stream("libx264", rate=fps, options=OPTIONS)
-        stream.pix_fmt = "yuv420p"
+    with _video_file(target, fps, OPTIONS) as write:
         for each in episodes:
             events = [frame.event for frame in each.frames]
             every = max(1, len(events) // SAMPLES)
             samples: list[Array] = []
             for place, picture in enumerate(_pictures(each.stretch, topic, events)):
                 size = size or (picture.width, picture.height)
-                if number == 0:
-                    stream.width, stream.height = size
-                whole = picture.reformat(*size, format="yuv420p")
-                whole.pts, whole.time_base = number, Fraction(1, fps)
-                output.mux(stream.encode(whole))
-                number += 1
+                write(picture.reformat(*size, format="yuv420p"))
                 if place % every == 0:
                     shown = picture.to_ndarray(format="rgb24")[::PIXEL_STEP, ::PIXEL_STEP]
                     samples.append(shown.reshape(-1, 3) / 255.0)
             pixels.append(np.concatenate(samples))
-        output.mux(stream.encode(None))
     if size is None:
         raise RecordingDamaged(f"{topic} has no picture")
     return ExportedCamera(camera_key(topic), _feature(*size, fps), pixels)
+
+
+def copy_pictures(source: Path, target: Path, wanted: Sequence[range], fps: int) -> None:
+    """Write some pictures of a dataset's file into a new one.
+
+    Args:
+        wanted: their places in the source, in its order
+
+    Raises:
+        RecordingDamaged: the source has not all of them.
+    """
+    places = (place for each in wanted for place in each)
+    with av.open(str(source)) as video, _video_file(target, fps, AGAIN) as write:
+        pictures = enumerate(video.decode(video=0))
+        for place in places:
+            found = next((picture for number, picture in pictures if number == place), None)
+            if found is None:
+                raise RecordingDamaged(f"{source.name} has no picture {place}")
+            write(found)
+
+
+@contextmanager
+def _video_file(target: Path, fps: int, options: dict[str, str]) -> Iterator[Callable[[av.VideoFrame], None]]:
+    """Give what writes the next picture, in YUV 4:2:0 and of the size of the first one."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    numbers = count()
+    with av.open(str(target), "w") as output:
+        stream = output.add_stream("libx264", rate=fps, options=options)
+        stream.pix_fmt = "yuv420p"
+
+        def write(picture: av.VideoFrame) -> None:
+            number = next(numbers)
+            if number == 0:
+                stream.width, stream.height = picture.width, picture.height
+            picture.pts, picture.time_base = number, Fraction(1, fps)
+            output.mux(stream.encode(picture))
+
+        yield write
+        output.mux(stream.encode(None))
 
 
 def _feature(width: int, height: int, fps: int) -> dict[str, Any]:

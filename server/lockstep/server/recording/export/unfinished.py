@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-__all__ = ["LOCK", "remove_stale", "stale_folders", "unfinished", "unfinished_file"]
+__all__ = ["LOCK", "remove_stale", "stale_folders", "unfinished", "unfinished_file", "unfinished_folder"]
 
 LOCK = "lockstep-export.lock"
 FOLDER = re.compile(r"\.(?P<name>.+)\.partial-\w+")
@@ -30,6 +30,20 @@ def unfinished(target: Path) -> Iterator[Path]:
     Raises:
         OSError: the folder cannot be made, or the target cannot take its place.
     """
+    with unfinished_folder(target) as folder:
+        yield folder / target.name
+        (folder / target.name).rename(target)
+
+
+@contextmanager
+def unfinished_folder(target: Path) -> Iterator[Path]:
+    """Give the folder of what is unfinished, with a lock in it, and remove it at the end with what is left there.
+
+    What killed exports to the same place have left is removed first.
+
+    Raises:
+        OSError: the folder cannot be made.
+    """
     target.parent.mkdir(parents=True, exist_ok=True)
     remove_stale(target.parent, target.name)
     folder = Path(tempfile.mkdtemp(prefix=f".{target.name}.partial-", dir=target.parent))
@@ -38,8 +52,7 @@ def unfinished(target: Path) -> Iterator[Path]:
         with tempfile.NamedTemporaryFile(dir=folder, delete=False) as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             os.rename(lock.name, folder / LOCK)
-            yield folder / target.name
-            (folder / target.name).rename(target)
+            yield folder
             shutil.rmtree(folder, ignore_errors=True)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)

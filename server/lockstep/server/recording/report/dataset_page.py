@@ -1,7 +1,7 @@
 """The report of a LeRobot dataset that Lockstep has exported, as one HTML page. Needs pyarrow."""
 
 from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 from itertools import accumulate, groupby, pairwise
 from pathlib import Path
@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 from lockstep.protocol.episodes import EpisodeOutcome
 from lockstep.protocol.serial import event_gap, is_event
 from lockstep.server.recording.errors import RecordingDamaged
-from lockstep.server.recording.export.lerobot_meta import DatasetNotes, file_of
+from lockstep.server.recording.export.lerobot_meta import DatasetNotes
 from lockstep.server.recording.format.records import EpisodeRecord, FeedbackRecord
 from lockstep.server.recording.reading.picture_at import jpeg_of
 from lockstep.server.recording.report import page_parts as parts
@@ -67,11 +67,11 @@ def dataset_page(root: Path) -> str:
     try:
         notes = _notes.decode((root / "meta" / "lockstep.json").read_bytes())
         info = _info.decode((root / "meta" / "info.json").read_bytes())
-        batches = [_rows(root, batch, notes) for batch in range(notes.batches)]
-        rows = [row for batch in batches for row in batch]
+        batches = {file: _rows(root, file, notes) for file in notes.files}
+        rows = [row for batch in batches.values() for row in batch]
         tally = _tally(rows, notes)
         widest = _widest(rows)
-        wanted, sizes = {row["index"] for row in widest}, [len(batch) for batch in batches]
+        wanted, sizes = {row["index"] for row in widest}, {file: len(batch) for file, batch in batches.items()}
         pictures = {camera: _pictures(root, camera, wanted, sizes) for camera in notes.cameras}
     except (msgspec.DecodeError, pa.ArrowException, KeyError, TypeError, IndexError, av.FFmpegError) as error:
         raise RecordingDamaged(f"{root.name}: {error}") from error
@@ -93,8 +93,8 @@ def dataset_page(root: Path) -> str:
     return parts.page(root.name, lead, sections)
 
 
-def _rows(root: Path, batch: int, notes: DatasetNotes) -> list[Row]:
-    with pq.ParquetFile(root / "data" / f"{file_of(batch)}.parquet") as table:
+def _rows(root: Path, file: str, notes: DatasetNotes) -> list[Row]:
+    with pq.ParquetFile(root / "data" / f"{file}.parquet") as table:
         columns = [name for name in (*COLUMNS, *DRIVEN) if name in table.schema_arrow.names]
         found: list[Row] = table.read(columns).to_pylist()
     for row in found:
@@ -284,20 +284,20 @@ def _widest(rows: list[Row]) -> list[Row]:
     return sorted(best.values(), key=lambda row: -int(row["lockstep.gap"]))[:MAX_SHOWN]
 
 
-def _pictures(root: Path, camera: str, wanted: set[int], sizes: Sequence[int]) -> dict[int, bytes]:
+def _pictures(root: Path, camera: str, wanted: set[int], sizes: Mapping[str, int]) -> dict[int, bytes]:
     """Return the pictures of these rows as JPEG, as far as few enough have to be decoded for them.
 
     Args:
-        sizes: number of rows, by batch
+        sizes: number of rows, by file
     """
     found: dict[int, bytes] = {}
     left = MAX_DECODED
-    for batch, end in enumerate(accumulate(sizes)):
-        begin = end - sizes[batch]
+    for (file, size), end in zip(sizes.items(), accumulate(sizes.values()), strict=True):
+        begin = end - size
         mine = {index - begin for index in wanted if begin <= index < end}
         if not mine:
             continue
-        with av.open(str(root / "videos" / camera / f"{file_of(batch)}.mp4")) as video:
+        with av.open(str(root / "videos" / camera / f"{file}.mp4")) as video:
             for at, frame in zip(range(min(left, max(mine) + 1)), video.decode(video=0), strict=False):
                 left -= 1
                 if at in mine:

@@ -13,7 +13,7 @@ from lockstep.protocol.serial import event_gap, is_event
 from lockstep.robot_bridge.robots.event_strip import read_event_strip
 from lockstep.server.recording.dataset.commit import is_interrupted
 from lockstep.server.recording.errors import RecordingDamaged
-from lockstep.server.recording.export.lerobot_meta import DatasetEpisode, DatasetNotes, file_of
+from lockstep.server.recording.export.lerobot_meta import DatasetEpisode, DatasetNotes
 from lockstep.server.recording.export.lerobot_sampling import LONGEST
 from lockstep.server.recording.verify.verify_origins import outdated, recorded_now
 
@@ -81,19 +81,15 @@ def verify_dataset(root: Path, *, pixels: bool = False, recordings: Path | None 
     try:
         notes = _notes_decoder.decode((root / "meta" / "lockstep.json").read_bytes())
         info = _info_decoder.decode((root / "meta" / "info.json").read_bytes())
-        parts = [_table(root / "data" / f"{file_of(batch)}.parquet") for batch in range(notes.batches)]
+        parts = [_table(root / "data" / f"{file}.parquet") for file in notes.files]
         rows = [row for part in parts for row in part]
-        places = [
-            place
-            for batch in range(notes.batches)
-            for place in _table(root / "meta" / "episodes" / f"{file_of(batch)}.parquet")
-        ]
+        places = [place for file in notes.files for place in _table(root / "meta" / "episodes" / f"{file}.parquet")]
         checks: dict[DatasetCheckName, DatasetCheck] = {name: DatasetCheck() for name in CHECKS}
         _check_rows(checks, notes, info["fps"], rows)
         _check_counts(checks["counted"], root, notes, info, rows, places)
-        for batch, part in enumerate(parts):
+        for file, part in zip(notes.files, parts, strict=True):
             for place, camera in enumerate(notes.cameras):
-                video = root / "videos" / camera / f"{file_of(batch)}.mp4"
+                video = root / "videos" / camera / f"{file}.mp4"
                 _check_video(
                     checks, camera, video, [(row["index"], _stamps(row, notes)[place]) for row in part], pixels
                 )
