@@ -1,6 +1,7 @@
 """A few short episodes through everything real: MuJoCo, bridge, console, people and a policy, dataset, pixels."""
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from lockstep.bench.episodes.cli import app
+from lockstep.bench.episodes.faults.fault_run import DISK_FAULTS, FAULTS, FaultName
 from lockstep.bench.episodes.pixels import look
 from lockstep.robot_bridge.robots.so101.model_source import FOLDER_VARIABLE
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
@@ -84,6 +86,19 @@ def test_a_console_that_is_killed_while_it_keeps_an_episode_leaves_a_dataset_of_
     [fault] = figures["faults"]
     assert fault["ok"]
     assert 1 <= fault["kept"] <= fault["in_dataset"] <= 2
+
+
+@pytest.mark.long
+@pytest.mark.timeout(600)
+@pytest.mark.usefixtures("arm")
+@pytest.mark.parametrize("fault", [each for each in FAULTS if each != "kill-keeping"])
+def test_whatever_fails_in_whatever_phase_leaves_a_dataset_of_whole_episodes(fault: FaultName) -> None:
+    if fault in DISK_FAULTS and os.geteuid() != 0:
+        pytest.skip("only root can mount a small disk")
+    done = CliRunner().invoke(app, ["--fault", fault, "--json", "-"])
+    assert done.exit_code == 0, done.output
+    [figures] = json.loads(done.stdout)["runs"]
+    assert [(each["fault"], each["wrong"]) for each in figures["faults"]] == [(fault, [])]
 
 
 @pytest.mark.timeout(600)

@@ -12,7 +12,7 @@ import pytest
 from playwright.async_api import Browser, Locator, expect
 
 from lockstep.bench.browsers.console_page import open_console
-from lockstep.bench.episodes.faults import ROBOT
+from lockstep.bench.episodes.faults.fault_run import ROBOT
 from lockstep.bench.episodes.small_disk import small_disk
 from lockstep.bench.harness.driving import drive_on
 from lockstep.bench.harness.stack import running_bridge

@@ -11,9 +11,9 @@ from typing import Annotated, Any
 import typer
 import uvloop
 
-from lockstep.bench.episodes.fault_alone import run_fault
-from lockstep.bench.episodes.faulted_day import record_faulted_day
-from lockstep.bench.episodes.faults import FAULTS, FaultName
+from lockstep.bench.episodes.faults.fault_alone import run_fault
+from lockstep.bench.episodes.faults.fault_run import FAULTS, FaultName
+from lockstep.bench.episodes.faults.faulted_day import record_faulted_day
 from lockstep.bench.episodes.run import Choices, record_episodes
 from lockstep.bench.figures.kept_run import kept_run
 from lockstep.bench.figures.machine import busy_percent

@@ -17,7 +17,16 @@ from lockstep.bench.experiment.stage import Stage, running_stage
 from lockstep.bench.pick_place.run import recorder_of
 from lockstep.emulator.impairment.profile import load_profile
 
-__all__ = ["LINK_SECONDS", "ROBOT", "Choices", "figures_of", "keep_files", "links_of", "record_episodes"]
+__all__ = [
+    "LINK_SECONDS",
+    "ROBOT",
+    "Choices",
+    "figures_of",
+    "keep_files",
+    "links_of",
+    "policy_link",
+    "record_episodes",
+]
 
 ROBOT: Final = "so101"
 NO_NETWORK: Final = "perfect"
@@ -74,15 +83,16 @@ async def record_episodes(choices: Choices, say: Callable[[str], None]) -> dict[
 async def links_of(stage: Stage, console: httpx.AsyncClient, *, through: bool) -> list[tuple[str, str]]:
     """Return the name and link of each of DRIVERS. `through`: they are reached through the network."""
     link = stage.link if through else stage.near_link
-    links = [link, link, await _policy_link(console, stage, through=through)]
+    policy = await policy_link(console)
+    links = [link, link, stage.network.link(policy) if through else policy]
     return list(zip(DRIVERS, links, strict=True))
 
 
-async def _policy_link(console: httpx.AsyncClient, stage: Stage, *, through: bool) -> str:
+async def policy_link(console: httpx.AsyncClient) -> str:
     """Invite the policy, as a person does on the page."""
     asked = {"role": "policy", "name": DRIVERS[POLICY], "seconds": LINK_SECONDS}
     link: str = (await console.post("/api/invitations", json=asked)).raise_for_status().json()["link"]
-    return stage.network.link(link) if through else link
+    return link
 
 
 def keep_files(folder: Path | None, recordings: Sequence[Path], root: Path) -> None:

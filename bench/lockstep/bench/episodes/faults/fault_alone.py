@@ -10,10 +10,13 @@ from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from typing import Any, Final
 
 from lockstep.bench.episodes.dataset import export, judged
-from lockstep.bench.episodes.faults import DISK_FAULTS, ROBOT, FaultName, FaultRun, meet, settings_of
+from lockstep.bench.episodes.faults.fault_run import DISK_FAULTS, ROBOT, FaultName, FaultRun
+from lockstep.bench.episodes.faults.faults import meet, settings_of
+from lockstep.bench.episodes.run import policy_link
 from lockstep.bench.episodes.session import drivers
 from lockstep.bench.episodes.small_disk import cancel_on_sigterm, small_disk
 from lockstep.bench.harness.stack import running_bridge, running_console
+from lockstep.bench.pick_place.run import recorder_of
 from lockstep.client import ConsoleLost
 
 __all__ = ["run_fault"]
@@ -31,13 +34,14 @@ async def run_fault(fault: FaultName, say: Callable[[str], None]) -> dict[str, A
     cancel_on_sigterm()
     async with _running(fault) as run:
         await run.keep_one()
+        await run.go_home()
         await meet(run)
         with suppress(ConsoleLost, TimeoutError):
             async with asyncio.timeout(REST_SECONDS):  # a robot that was killed proves no rest
                 await run.driver.rest()
         recordings = run.folder / "recordings"
         root = run.folder / "dataset"
-        await run.console.end()  # a console that still lives ends its recording
+        await run.console.end()  # one that still lives ends its recording
         if not root.exists():
             said = await export(sorted(recordings.glob("*.mcap")), root)
             run.wrong += [f"export: {said}"] if said else []
@@ -78,4 +82,5 @@ async def _running(fault: FaultName) -> AsyncIterator[FaultRun]:
         }
         console, links = await stack.enter_async_context(running_console(bridge.address, environment=settings))
         [driver] = await stack.enter_async_context(drivers([("Ada", links["operator"])], pictures=False))
-        yield FaultRun(fault, folder, bridge.process, console, driver)
+        http = await stack.enter_async_context(recorder_of(links["operator"]))
+        yield FaultRun(fault, folder, bridge.process, console, driver, links["operator"], await policy_link(http))

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lockstep.bench.episodes.dataset import Kept
-from lockstep.bench.episodes.faulted_day import Day, shares
-from lockstep.bench.episodes.faults import FaultRun
+from lockstep.bench.episodes.faults.fault_run import FaultRun
+from lockstep.bench.episodes.faults.faulted_day import Day, shares
 from lockstep.bench.episodes.plan import plan
 from lockstep.bench.episodes.session import Done
 
@@ -26,7 +26,8 @@ def kept(episode: str) -> Kept:
 
 
 def run(fault: str, *episodes: str, perhaps: tuple[str, ...] = (), wrong: tuple[str, ...] = ()) -> FaultRun:
-    found = FaultRun(cast(Any, fault), cast(Any, None), cast(Any, None), cast(Any, None), cast(Any, None))
+    nothing = cast(Any, None)
+    found = FaultRun(cast(Any, fault), nothing, nothing, nothing, nothing, nothing, "")
     found.kept, found.perhaps, found.wrong = (
         [kept(each) for each in episodes],
         [kept(each) for each in perhaps],

@@ -15,15 +15,15 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 from lockstep.bench.episodes.dataset import Kept, export, judged
-from lockstep.bench.episodes.faults import DISK_FAULTS, ROBOT, FaultName, FaultRun, meet, settings_of
+from lockstep.bench.episodes.faults.fault_run import DISK_FAULTS, ROBOT, FaultName, FaultRun, following
+from lockstep.bench.episodes.faults.faults import meet, settings_of
 from lockstep.bench.episodes.plan import DRIVERS, Planned, plan
-from lockstep.bench.episodes.run import Choices, figures_of, keep_files, links_of
+from lockstep.bench.episodes.run import Choices, figures_of, keep_files, links_of, policy_link
 from lockstep.bench.episodes.session import Done, Session, drivers
 from lockstep.bench.episodes.small_disk import cancel_on_sigterm, small_disk
 from lockstep.bench.experiment.choices import media_of
 from lockstep.bench.experiment.stage import running_stage
 from lockstep.bench.harness.processes import started
-from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.bench.pick_place.run import recorder_of
 from lockstep.emulator.impairment.profile import load_profile
 
@@ -131,7 +131,7 @@ async def _until_fault(
         stage = await stack.enter_async_context(
             running_stage(ROBOT, profile, media_of(profile), seed, robot_link=through, settings=settings)
         )
-        following = await stack.enter_async_context(started(_follow(folder)))
+        follower = await stack.enter_async_context(started(following(folder)))
         recorder = await stack.enter_async_context(recorder_of(stage.near_link))
         named = await links_of(stage, recorder, through=through)
         consoles = await stack.enter_async_context(drivers(named, pictures=choices.pictures))
@@ -139,15 +139,11 @@ async def _until_fault(
         session = Session(consoles, say)
         done = [await session.run(each) for each in planned]
         driver = await session.person()
-        run = FaultRun(fault, folder, stage.bridge, stage.console, driver, DRIVERS[consoles.index(driver)])
+        policy = stage.network.link(await policy_link(recorder)) if through else await policy_link(recorder)
+        name = DRIVERS[consoles.index(driver)]
+        run = FaultRun(fault, folder, stage.bridge, stage.console, driver, stage.near_link, policy, name)
         await meet(run)
         day.add(done, run)
         say(f"{fault}: {'; '.join(run.wrong) or 'right'}; the console said: {'; '.join(run.said)}")
-        await following.kill()
+        await follower.kill()
         await stage.console.end()  # one that still lives ends its recording
-
-
-def _follow(folder: Path) -> tuple[str, ...]:
-    """Return the command that appends each kept episode while others are driven."""
-    where = ("--out", str(folder / "live"), "--dir", str(folder / "recordings"), "--state-dir", str(folder))
-    return (LOCKSTEP, "export", "--to", "lerobot", "--follow", *where)
