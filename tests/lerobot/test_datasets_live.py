@@ -141,7 +141,7 @@ async def test_after_an_episode_is_discarded_late_lerobot_loads_what_is_left_and
     for root in (grown, shared):
         said: list[str] = []
         append_once(recordings, root, options, said.append)
-        assert said[0].endswith(f"was discarded, and is taken out of {root.name}, which has 1 left")
+        assert said[0].endswith(f": discarded since, and taken out of {root.name}, which has 1 left")
         verdict = verify_dataset(root, pixels=True, recordings=tmp_path)
         assert verdict.ok, verdict
         seen = await used(tmp_path, "load", root)

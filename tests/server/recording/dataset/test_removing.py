@@ -15,17 +15,20 @@ from lockstep.bench.episodes.small_disk import small_disk
 from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.server.cli.recordings.follow import append_once
 from lockstep.server.recording.dataset import exchange
+from lockstep.server.recording.dataset import follower as follower_module
 from lockstep.server.recording.dataset.appending import alone_with, is_dataset, read_state
 from lockstep.server.recording.errors import DatasetRefused
 from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.export.export_lerobot import DatasetOptions
+from lockstep.server.recording.format.records import Degraded
 from lockstep.server.recording.report.dataset_page import dataset_page
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from tests.server.recording.dataset.growing_file import GrowingFile
-from tests.server.recording.dataset.test_appending import all_rows, events_of, follower
+from tests.server.recording.dataset.test_appending import Killed, all_rows, events_of, follower
 from tests.server.recording.episodes.test_edited_datasets import NEXT, change
 from tests.server.recording.graders import PASSED, doctor_findings
-from tests.server.recording.test_episode_export import KEPT_AND_NOT, recording
+from tests.server.recording.makers import EPOCH, INTERVAL, START, own_entry
+from tests.server.recording.test_episode_export import KEPT_AND_NOT, episode, recording
 
 A, C, F = [*range(10, 20)], [*range(45, 60)], [*range(70, 90)]
 RECORDS = (*KEPT_AND_NOT[:6], *NEXT)
@@ -54,6 +57,10 @@ def appended(path: Path, root: Path) -> list[str]:
     return said
 
 
+def killed(*_: object) -> None:
+    raise Killed
+
+
 def files_of(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
@@ -74,7 +81,8 @@ def test_what_is_left_is_what_an_export_without_the_episode_would_be(
     (root / "README.md").write_text("mine")
     change(path, *({"episode": each, "dropped": True} for each in discarded))
     said = appended(path, root)
-    assert said[0] == f"episode {discarded[0]} of a.mcap was discarded, and is taken out of dataset, which has 2 left"
+    names, count = ", ".join(discarded), len(left)
+    assert said[0] == f"episode {names}: discarded since, and taken out of dataset, which has {count} left"
     assert said[-1] == "0 appended, 0 left out"
     assert events_of(root) == left
     assert (root / "README.md").read_text() == "mine"
@@ -129,7 +137,7 @@ def test_of_an_episode_of_which_a_part_is_discarded_the_other_part_stays(tmp_pat
     path, root = grown(tmp_path)
     change(path, {"episode": "c", "split": 50}, {"episode": "edit-1a", "dropped": True})
     said = appended(path, root)
-    assert said[0] == "episode edit-1a of a.mcap was discarded, and is taken out of dataset, which has 2 left"
+    assert said[0] == "episode c: discarded since, and taken out of dataset, which has 2 left"
     assert events_of(root) == [A, F, [*range(50, 60)]]
     assert verify_dataset(root, pixels=True, recordings=tmp_path).ok
 
@@ -148,7 +156,7 @@ def test_when_all_are_discarded_there_is_no_dataset_and_the_next_kept_one_begins
     path, root = made(tmp_path)
     change(path, *({"episode": each, "dropped": True} for each in "acf"))
     said = appended(path, root)
-    assert said[2] == "episode f of a.mcap was discarded, and is taken out of dataset, which has 0 left"
+    assert said[0] == "episode a, c, f: discarded since, and taken out of dataset, which has 0 left"
     assert not root.exists()
     assert not beside(root)
     change(path, {"episode": "c", "dropped": False})
@@ -165,7 +173,7 @@ def test_a_follower_takes_it_out_though_the_recording_does_not_grow_any_more(tmp
     said.clear()
     change(path, {"episode": "a", "dropped": True})
     assert [following.look([path]), following.look([path])] == [0, 0]
-    assert said == ["episode a of a.mcap was discarded, and is taken out of dataset, which has 2 left"]
+    assert said == ["episode a: discarded since, and taken out of dataset, which has 2 left"]
     assert events_of(root) == [C, F]
 
 
@@ -193,9 +201,7 @@ def test_where_folders_cannot_be_exchanged_it_stays_and_is_named_once(
     change(path, {"episode": "f", "task": "pull"})
     following.look([path])
     following.look([path])
-    assert [each for each in said if "stays" in each] == [
-        "episode c of a.mcap was discarded, and stays in dataset: planted"
-    ]
+    assert [each for each in said if "stays" in each] == ["what dataset has of discarded episodes (c) stays: planted"]
     assert files_of(root) == before
     assert not beside(root)
 
@@ -213,7 +219,7 @@ def test_on_a_full_disk_the_dataset_is_as_it_was_and_the_episode_leaves_it_when_
         change(path, {"episode": "c", "dropped": True})
         for _ in range(2):
             following.look([path])
-            assert "cannot be written, and is tried again" in said[-1]
+            assert said[-1].startswith("what dataset has of discarded episodes (c) is tried again: ")
             assert files_of(root) == before
             assert not beside(root)
         ballast.unlink()
@@ -252,3 +258,214 @@ async def test_a_process_that_is_killed_at_any_moment_leaves_the_dataset_before_
     assert sorted(events_of(root)) == ([A, F] if without else [A, C, F])
     assert verify_dataset(root).ok
     assert is_dataset(root)
+
+
+def test_a_kept_part_is_appended_though_the_follower_has_looked_between_the_changes(tmp_path: Path) -> None:
+    path, root = grown(tmp_path)
+    following = follower(root)
+    changes: list[dict[str, Any]] = [{"episode": "c", "split": 50}, {"episode": "edit-1a", "dropped": True}]
+    for one in changes:
+        change(path, one)
+        following.look([path])
+    assert events_of(root) == [A, F, [*range(50, 60)]]
+
+
+def test_an_episode_that_was_changed_and_discarded_comes_in_as_it_is_when_it_is_put_back(tmp_path: Path) -> None:
+    path, root = grown(tmp_path)
+    following = follower(root)
+    changes: list[dict[str, Any]] = [{"first_event": 50}, {"dropped": True}, {"dropped": False}]
+    for one in changes:
+        change(path, {"episode": "c", **one})
+        following.look([path])
+    assert events_of(root) == [A, F, [*range(50, 60)]]
+
+
+@pytest.mark.parametrize("restarted", [False, True])
+def test_a_kept_part_of_an_old_episode_is_appended_by_a_follower_that_takes_new_ones(
+    tmp_path: Path, restarted: bool
+) -> None:
+    path, root = grown(tmp_path)
+    late, following = 2**60, follower(root)
+    change(path, {"episode": "c", "split": 50}, {"episode": "edit-1a", "dropped": True})
+    if restarted:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(follower_module, "append", killed)
+            with pytest.raises(Killed):
+                following.look([path], since=late)
+        following = follower(root)
+    following.look([path], since=late)
+    assert events_of(root) == [A, F, [*range(50, 60)]]
+
+
+def test_a_discarded_episode_leaves_though_it_was_trimmed_to_other_events_since(tmp_path: Path) -> None:
+    path, root = recording(tmp_path / "a.mcap", *RECORDS), tmp_path / "dataset"
+    change(path, {"episode": "c", "first_event": 55})
+    appended(path, root)
+    change(path, {"episode": "c", "first_event": 45, "last_event": 52}, {"episode": "c", "dropped": True})
+    appended(path, root)
+    assert events_of(root) == [A, F]
+
+
+def test_a_discarded_episode_without_rows_is_noted_no_more(tmp_path: Path) -> None:
+    lost = own_entry(Degraded(epoch=EPOCH, event=62, lost=1), START + 61 * INTERVAL + 1_000_000)
+    path, root = recording(tmp_path / "a.mcap", lost, *RECORDS), tmp_path / "dataset"
+    appended(path, root)
+    assert [each.episode for each in read_state(root).notes.without_rows] == ["f"]
+    change(path, {"episode": "f", "dropped": True})
+    appended(path, root)
+    assert read_state(root).notes.without_rows == []
+
+
+def test_what_others_have_put_into_the_folder_stays_when_the_last_episode_goes(tmp_path: Path) -> None:
+    root = tmp_path / "dataset"
+    (root / "recordings").mkdir(parents=True)
+    (root / "README.md").write_text("mine")
+    path = recording(root / "recordings" / "a.mcap", *RECORDS)
+    appended(path, root)
+    change(path, *({"episode": each, "dropped": True} for each in "acf"))
+    appended(path, root)
+    assert sorted(files_of(root)) == ["README.md", "recordings/a.episodes.jsonl", "recordings/a.mcap"]
+    assert not (root / "data").exists()
+
+
+def test_a_dataset_that_begins_anew_has_the_options_of_the_one_before(tmp_path: Path) -> None:
+    path, root = recording(tmp_path / "a.mcap", *RECORDS[2:4], *NEXT), tmp_path / "dataset"
+    append_once([path], root, DatasetOptions(fps=10, tolerance=2), lambda _: None)
+    change(path, {"episode": "f", "split": 80}, {"episode": "edit-1a", "dropped": True})
+    appended(path, root)
+    state = read_state(root)
+    assert (state.fps, state.notes.has_rate, state.notes.tolerance) == (10, True, 2)
+
+
+def test_a_deletion_that_was_interrupted_is_completed_before_a_dataset_begins(tmp_path: Path) -> None:
+    path, root = grown(tmp_path)
+    (root / "meta" / "info.json").unlink()
+    change(path, *({"episode": each, "dropped": True} for each in "af"))
+    appended(path, root)
+    assert events_of(root) == [C]
+    assert verify_dataset(root).ok
+
+
+def test_a_copy_without_the_changes_brings_no_discarded_episode_back(tmp_path: Path) -> None:
+    path, root = grown(tmp_path)
+    copy = Path(shutil.copy(path, tmp_path / "b.mcap"))
+    change(path, {"episode": "c", "dropped": True})
+    for _ in range(2):
+        said: list[str] = []
+        append_once([copy, path], root, DatasetOptions(), said.append)
+        assert events_of(root) == [A, F]
+    assert "episode c of b.mcap is left out: it was discarded, in another copy of the recording" in said
+
+
+def test_a_recording_that_says_itself_that_an_episode_was_discarded_takes_nothing_out(tmp_path: Path) -> None:
+    """Such a one never came into a dataset: this record is of another recording, whatever it says."""
+    _, root = grown(tmp_path)
+    other = (episode("x", "start", 1, 1), episode("x", "discarded", 1, 100))
+    appended(recording(tmp_path / "z.mcap", *other), root)
+    assert events_of(root) == [A, C, F]
+
+
+@pytest.mark.parametrize("name", ["data", "meta", "videos"])
+def test_a_dataset_that_is_partly_elsewhere_stays_as_it_is(tmp_path: Path, name: str) -> None:
+    path, root = grown(tmp_path)
+    (root / name).rename(tmp_path / "elsewhere")
+    (root / name).symlink_to(tmp_path / "elsewhere")
+    before = files_of(tmp_path / "elsewhere")
+    change(path, {"episode": "c", "dropped": True})
+    assert "stays: " in appended(path, root)[0]
+    assert files_of(tmp_path / "elsewhere") == before
+
+
+@pytest.mark.parametrize("damage", ["shorter", "missing"])
+def test_a_damaged_dataset_stays_as_it_is_and_is_named_once(tmp_path: Path, damage: str) -> None:
+    path, root = in_one_file(tmp_path)
+    (video,) = root.rglob("*.mp4")
+    if damage == "missing":
+        video.unlink()
+    else:
+        video.write_bytes(video.read_bytes()[:2000])
+    change(path, {"episode": "c", "dropped": True})
+    said: list[str] = []
+    following = follower(root, said)
+    for _ in range(2):
+        following.look([path])
+    assert len(said) == 1
+    assert "stays: " in said[0]
+    assert not beside(root)
+
+
+def test_after_an_error_behind_the_exchange_the_dataset_grows_on_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, root = in_one_file(tmp_path)
+    following, sync = follower(root), exchange._sync
+
+    def fail(where: Path) -> None:
+        if where == tmp_path:
+            raise OSError(5, "planted")
+        sync(where)
+
+    monkeypatch.setattr(exchange, "_sync", fail)
+    change(path, {"episode": "c", "dropped": True})
+    following.look([path])
+    monkeypatch.undo()
+    change(path, {"episode": "c", "dropped": False})
+    following.look([path])
+    assert events_of(root) == [A, F, C]
+    assert verify_dataset(root, pixels=True).ok
+
+
+def test_folders_keep_their_modes_and_owners_and_files_that_are_no_files_stay(tmp_path: Path) -> None:
+    path, root = grown(tmp_path)
+    (root / "data").chmod(0o2775)
+    (root / "empty").mkdir()
+    os.mkfifo(root / "fifo")
+    if os.geteuid() == 0:
+        os.chown(root / "data", 1234, 1234)
+    before = (root / "data").stat()
+    change(path, {"episode": "c", "dropped": True})
+    appended(path, root)
+    after = (root / "data").stat()
+    assert (after.st_mode, after.st_uid, after.st_gid) == (before.st_mode, before.st_uid, before.st_gid)
+    assert (root / "empty").is_dir()
+    assert (root / "fifo").is_fifo()
+
+
+def test_one_process_at_a_time_changes_a_dataset_also_behind_a_link(tmp_path: Path) -> None:
+    _, root = grown(tmp_path)
+    (tmp_path / "link").symlink_to(root)
+    with alone_with(root), pytest.raises(DatasetRefused), alone_with(tmp_path / "link"):
+        pass
+
+
+def test_a_file_that_the_dataset_does_not_say_is_found(tmp_path: Path) -> None:
+    _, root = grown(tmp_path)
+    shutil.copy(root / "data/chunk-000/file-000.parquet", root / "data/chunk-000/file-009.parquet")
+    assert verify_dataset(root).checks["counted"].violations[0].text.startswith("data/chunk-000/file-009.parquet")
+
+
+def test_a_dataset_behind_a_link_begins_anew_there_when_all_were_discarded_and_one_is_put_back(tmp_path: Path) -> None:
+    path, root = grown(tmp_path)
+    link = tmp_path / "link"
+    link.symlink_to(root)
+    change(path, *({"episode": each, "dropped": True} for each in "acf"))
+    appended(path, link)
+    change(path, {"episode": "c", "dropped": False})
+    appended(path, link)
+    assert events_of(link) == [C]
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount a small disk")
+def test_a_dataset_that_is_a_mount_stays_as_it_is_and_all_of_it_can_go(tmp_path: Path) -> None:
+    path, made = grown(tmp_path)
+    root = tmp_path / "mount"
+    root.mkdir()
+    with small_disk(root, 4 << 20):
+        shutil.copytree(made, root, dirs_exist_ok=True)
+        before = files_of(root)
+        change(path, {"episode": "c", "dropped": True})
+        assert "stays: " in appended(path, root)[0]
+        assert files_of(root) == before
+        change(path, *({"episode": each, "dropped": True} for each in "af"))
+        appended(path, root)
+        assert files_of(root) == {}

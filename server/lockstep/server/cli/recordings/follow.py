@@ -11,6 +11,7 @@ from types import FrameType
 
 from lockstep.server.recording.dataset.appending import alone_with
 from lockstep.server.recording.dataset.follower import DatasetFollower
+from lockstep.server.recording.episodes.edits import edits_path
 from lockstep.server.recording.export.export_lerobot import DatasetOptions, Say
 
 __all__ = ["append_once", "follow"]
@@ -25,6 +26,7 @@ def append_once(paths: Sequence[Path], root: Path, options: DatasetOptions, say:
     A recording that was not made by episodes is one as a whole, as in an export of all; `say` is told what was left out
     by name, and at the end how many that were.
     """
+    root = root.resolve()  # a link stays one, whatever becomes of where it leads
     with alone_with(root):
         follower = DatasetFollower(root, options, say)
         follower.take_wholes(paths)
@@ -54,6 +56,7 @@ def follow(
         OSError: it cannot be written.
     """
     _give_way()
+    root = root.resolve()  # a link stays one, whatever becomes of where it leads
     with alone_with(root) as memory, _told_to_end() as ended:
         if begun:
             say(begun)
@@ -76,10 +79,12 @@ def _since(memory: Path) -> int:
 
 
 def _changed(path: Path) -> float:
-    try:
-        return path.stat().st_mtime
-    except FileNotFoundError:
-        return 0.0
+    """Return when a recording or the changes to it were written last, s since 1970."""
+    found = 0.0
+    for each in (path, edits_path(path)):
+        with suppress(OSError):
+            found = max(found, each.stat().st_mtime)
+    return found
 
 
 def _give_way() -> None:

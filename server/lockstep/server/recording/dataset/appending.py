@@ -43,6 +43,7 @@ def alone_with(root: Path) -> Iterator[Path]:
         DatasetRefused: another process appends to it.
         OSError: the lock or the dataset cannot be written.
     """
+    root = root.resolve()  # one lock, whatever links lead here
     root.parent.mkdir(parents=True, exist_ok=True)
     lock = root.with_name(f".{root.name}.lock")
     number = os.open(lock, os.O_RDWR | os.O_CREAT, 0o600)
@@ -52,8 +53,7 @@ def alone_with(root: Path) -> Iterator[Path]:
         except BlockingIOError as error:
             raise DatasetRefused(f"another process appends to {root.name}") from error
         recover(root)
-        place = root.resolve()
-        remove_stale(place.parent, place.name)
+        remove_stale(root.parent, root.name)
         yield lock
     finally:
         os.close(number)

@@ -4,7 +4,7 @@ import ctypes
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from lockstep.server.recording.errors import DatasetRefused
@@ -19,23 +19,35 @@ AT_FDCWD, RENAME_EXCHANGE = -100, 2  # linux/fcntl.h, linux/fs.h
 def exchanged(place: Path) -> Iterator[Path]:
     """Give a new folder to fill, and exchange it with the one at `place` at the end, which is deleted then.
 
-    After an error nothing has changed. What a killed process leaves, whichever of the two it is, `remove_stale` finds.
+    It has the folders of `place`, empty, with their owners and modes. After an error nothing has changed. What a killed
+    process leaves, whichever of the two it is, `remove_stale` finds.
 
     Raises:
         DatasetRefused: the system or the file system exchanges no folders.
         OSError: the folder cannot be made.
     """
+    if os.path.ismount(place):
+        raise DatasetRefused(f"{place} is a mount, which no folder can be exchanged with")
     with unfinished_folder(place) as folder:
+        _try(folder)
         new = folder / place.name
-        new.mkdir()
-        shutil.copymode(place, new)
+        _copy_folders(place, new)
         yield new
-        for path in [*new.rglob("*"), new]:
-            if not path.is_symlink():
-                _sync(path)
+        _sync_written(new)
         _exchange(new, place)
-        _sync(folder)
-        _sync(place.parent)
+        with suppress(OSError):  # it has happened: whoever called reads the new one
+            _sync(folder)
+            _sync(place.parent)
+
+
+def _try(folder: Path) -> None:
+    """Raise DatasetRefused where folders cannot be exchanged, before much is written for it."""
+    one, other = folder / "one", folder / "other"
+    one.mkdir()
+    other.mkdir()
+    _exchange(one, other)
+    one.rmdir()
+    other.rmdir()
 
 
 def _exchange(one: Path, other: Path) -> None:
@@ -46,6 +58,26 @@ def _exchange(one: Path, other: Path) -> None:
     if rename(AT_FDCWD, os.fsencode(one), AT_FDCWD, os.fsencode(other), RENAME_EXCHANGE) != 0:
         why = os.strerror(ctypes.get_errno())
         raise DatasetRefused(f"{other} cannot be exchanged with a folder beside it: {why}")
+
+
+def _copy_folders(place: Path, new: Path) -> None:
+    for folder, _, _ in os.walk(place):
+        copy = new / Path(folder).relative_to(place)
+        copy.mkdir()
+        found = os.stat(folder)
+        with suppress(PermissionError):  # only root gives a folder to somebody else
+            os.chown(copy, found.st_uid, found.st_gid)
+        shutil.copymode(folder, copy)
+
+
+def _sync_written(new: Path) -> None:
+    """Synchronise the folders and the files in them that are no links to old ones."""
+    for folder, _, names in os.walk(new):
+        for name in names:
+            path = Path(folder) / name
+            if path.is_file() and not path.is_symlink() and path.stat().st_nlink == 1:
+                _sync(path)
+        _sync(Path(folder))
 
 
 def _sync(path: Path) -> None:

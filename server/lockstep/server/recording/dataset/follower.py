@@ -3,16 +3,20 @@
 It belongs into a process of its own, with a low priority: the console writes the recording and knows nothing of it.
 """
 
-from collections.abc import Mapping, Sequence
+import errno
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+
+import msgspec
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.server.recording.dataset.appending import append, is_dataset, note_without_rows, read_state
 from lockstep.server.recording.dataset.commit import recover
 from lockstep.server.recording.dataset.growing import GrowingRecording
-from lockstep.server.recording.dataset.removing import remove
-from lockstep.server.recording.episodes.edit_rules import apply_edits
+from lockstep.server.recording.dataset.removing import Discarded, complete_deletion, event_range, remove
+from lockstep.server.recording.episodes.edit_rules import EditedEpisode, apply_edits
 from lockstep.server.recording.episodes.edits import edits_version, read_edits
 from lockstep.server.recording.errors import DatasetRefused, RecordingError
 from lockstep.server.recording.export.export_lerobot import (
@@ -27,6 +31,7 @@ from lockstep.server.recording.export.export_lerobot import (
 )
 from lockstep.server.recording.export.lerobot_batch import DatasetState
 from lockstep.server.recording.export.lerobot_layout import layout_of
+from lockstep.server.recording.export.lerobot_meta import DatasetEpisode, EventRange
 from lockstep.server.recording.export.lerobot_present import present
 from lockstep.server.recording.export.lerobot_rows import (
     EpisodeRows,
@@ -35,13 +40,15 @@ from lockstep.server.recording.export.lerobot_rows import (
     rows_of,
     stretches_of,
 )
-from lockstep.server.recording.format.episodes import EpisodeEntry
+from lockstep.server.recording.format.topics import CAMERA
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.reading.whole_recordings import whole_recordings
 
 __all__ = ["DatasetFollower"]
 
 NOT_FOLLOWED = "it has no episodes, and what is followed are kept episodes alone; --append takes it, or says why not"
+DISCARDED = "it was discarded, in another copy of the recording"
+FULL = (errno.ENOSPC, errno.EDQUOT)
 Key = tuple[str, int, int]  # of a stretch: its episode and its first and last event
 FILE: Key = ("", 0, 0)  # the file itself
 
@@ -52,16 +59,25 @@ class _File:
 
     Attributes:
         edits: version of the changes that were taken into account
-        again: it has an episode that could not be written
+        episodes: with all changes
+        again: it has an episode that could not be written, or may fit by now
         passed: stretches that have been said not to fit
-        staying: episodes that have been said to stay in the dataset though they were discarded
     """
 
     growing: GrowingRecording
     edits: tuple[int, int, int] | None = None
+    episodes: list[EditedEpisode] = field(default_factory=list)
     again: bool = False
     passed: set[Key] = field(default_factory=set)
-    staying: set[Key] = field(default_factory=set)
+
+    @property
+    def discarded(self) -> Iterator[Discarded]:
+        """Yield the episodes that were kept once and are no more. Only such a one can be in a dataset."""
+        index = self.growing.index
+        for each in self.episodes:
+            if each.is_dropped:
+                first, last = each.entry.first_event, each.entry.last_event
+                yield Discarded(index.part, each.entry.id, event_range(index.recording, index.epoch, first, last))
 
 
 class DatasetFollower:
@@ -85,10 +101,15 @@ class DatasetFollower:
         self._options = options
         self._say = say
         self._wholes: Mapping[Path, str] | None = None  # None: files without episodes are left out
+        complete_deletion(root)
         self._state: DatasetState | None = read_state(root) if is_dataset(root) else None
         self._robot: RobotDescription | None = None
         self._files: dict[Path, _File] = {}  # those that were there at the last look
         self._without_rows: list[EpisodeRows] = []  # that the dataset is to note when it begins
+        self._discarded: Sequence[Discarded] = ()  # of all files at the last look
+        self._staying: set[Discarded] = set()  # of which it was said that they cannot be taken out
+        self._owes_removal = False  # the disk was full
+        self._taken_out: list[DatasetEpisode] = []
 
     def take_wholes(self, paths: Sequence[Path]) -> None:
         """Append those of these files that have no episodes too, each as one, where `whole_recordings` allows it."""
@@ -97,34 +118,51 @@ class DatasetFollower:
         self._wholes = whole_recordings(paths, wanted=self._options.whole, beside=beside)
 
     def look(self, paths: Sequence[Path], since: int = 0) -> int:
-        """Append what is new, oldest first; return the number of episodes.
+        """Take out what was discarded, then append what is new, oldest first; return the number of appended episodes.
 
         Args:
             paths: recordings, whole or still written
-            since: µs since 1970; episodes that ended before are left out
+            since: µs since 1970; episodes that ended before are not appended, but where the dataset had events of them
 
         Raises:
             RecordingError, OSError: the dataset cannot be read any more.
         """
+        wanted = [self._files.setdefault(path, _File(GrowingRecording(path))) for path in sorted(paths, key=_age)]
+        changed = [file for file in wanted if self._with_care(file, partial(self._read, file))]
+        if changed or self._owes_removal:
+            self._take_out([each for file in wanted for each in file.discarded], wanted)
         count = 0
-        for path in sorted(paths, key=_age):
-            file = self._files.setdefault(path, _File(GrowingRecording(path)))
-            try:
-                edits = edits_version(path)
-                if file.growing.advance() or file.again or edits != file.edits:
-                    file.again = False
-                    file.edits = edits
-                    count += self._take(file, since)
-                if said := self._not_taken(file.growing):
-                    self._pass_over(file, FILE, said)
-            except RecordingError as error:
-                self._pass_over(file, FILE, left_out(path, "", str(error)))
-            except FileNotFoundError:
-                del self._files[path]  # recordings have a bound, and the oldest are deleted
+        for file in wanted:
+            if file in changed or file.again:
+                file.again = False
+                count += self._with_care(file, partial(self._take, file, since))
+            if said := self._not_taken(file.growing):
+                self._pass_over(file, FILE, said)
         for path in self._files.keys() - set(paths):
             if not path.exists():
                 del self._files[path]
         return count
+
+    def _with_care(self, file: _File, work: Callable[[], int]) -> int:
+        """Do it; return 0 where the recording cannot be read, which is said, or is not there any more."""
+        path = file.growing.path
+        try:
+            return work()
+        except RecordingError as error:
+            self._pass_over(file, FILE, left_out(path, "", str(error)))
+        except FileNotFoundError:
+            self._files.pop(path, None)  # recordings have a bound, and the oldest are deleted
+        return 0
+
+    def _read(self, file: _File) -> bool:
+        """Read what is new of a recording and of the changes to it; return whether there was something."""
+        growing = file.growing
+        edits = edits_version(growing.path)
+        if not growing.advance() and edits == file.edits:
+            return False
+        file.edits = edits
+        file.episodes = apply_edits(growing.index.episodes, read_edits(growing.path)).episodes
+        return True
 
     def _not_taken(self, growing: GrowingRecording) -> str:
         """Return in words that a file without episodes is left out; "" if it is not, or is still written."""
@@ -137,43 +175,62 @@ class DatasetFollower:
 
     def _take(self, file: _File, since: int) -> int:
         growing = file.growing
-        recorded = growing.index.episodes
-        episodes = apply_edits(recorded, read_edits(growing.path)).episodes
-        for each in episodes:
-            if each.entry.state == "discarded":
-                self._take_out(file, each.entry)
-        is_whole = not recorded and self._wholes is not None and self._wholes.get(growing.path) == ""
-        if not is_whole and not any(each.entry.state == "kept" and each.entry.ended >= since for each in episodes):
+        is_whole = not growing.index.episodes and self._wholes is not None and self._wholes.get(growing.path) == ""
+        if not is_whole and not any(each.entry.state == "kept" for each in file.episodes):
             return 0
         with growing.reader() as reader:
-            stretches = stretches_of(reader, episodes, self._options.task if is_whole else None)
-            new = (each for each in stretches if each.ended >= since and self._is_new(file, each))
+            stretches = stretches_of(reader, file.episodes, self._options.task if is_whole else None)
+            new = (each for each in stretches if self._is_due(each, since) and self._is_new(file, each))
             return sum(self._append(reader, each, file) for each in new)
 
-    def _take_out(self, file: _File, entry: EpisodeEntry) -> None:
-        """Take what the dataset has of a discarded episode out of it, under whatever id it has it."""
-        state, index = self._state, file.growing.index
-        key = entry.id, entry.first_event, entry.last_event
-        if state is None or key in file.staying:
+    def _is_due(self, stretch: Stretch, since: int) -> bool:
+        """Return whether it ended late enough, or is kept of what was taken out."""
+        taken_out = [] if self._state is None else self._state.notes.taken_out
+        own = stretch.info.recording, stretch.info.epoch, stretch.first_event, stretch.last_event
+        return stretch.ended >= since or any(each.shared(*own) for each in (*taken_out, *self._taken_out))
+
+    def _take_out(self, discarded: Sequence[Discarded], files: Sequence[_File]) -> None:
+        """Take what the dataset has of discarded episodes out of it, under whatever ids it has it."""
+        self._discarded = discarded
+        new = [each for each in discarded if each not in self._staying]
+        before, self._owes_removal = self._state, False
+        if before is None or not new:
             return
-        events = index.recording, index.epoch, entry.first_event, entry.last_event
-        found = [number for number, each in enumerate(state.notes.episodes) if each.shared(*events)]
-        if not found:
-            return
-        name = f"episode {entry.id} of {file.growing.path.name} was discarded"
         try:
-            self._state = remove(self._root, state, found)
-        except RecordingError as error:
-            file.staying.add(key)
-            self._say(f"{name}, and stays in {self._root.name}: {error}")
-        except OSError as error:
+            self._state, taken = remove(self._root, before, new)
+        except (RecordingError, OSError) as error:
+            is_full = isinstance(error, OSError) and error.errno in FULL
+            self._owes_removal = is_full
+            if not is_full:
+                self._staying.update(new)
+            what = "is tried again" if is_full else "stays"
+            names = ", ".join(sorted({each.episode for each in new}))
+            self._say(f"what {self._root.name} has of discarded episodes ({names}) {what}: {error}")
+            recover(self._root)
+            self._state = read_state(self._root) if is_dataset(self._root) else None
+            return
+        if not taken:
+            return
+        if self._state is None:
+            self._options, self._robot = _options_of(before, self._options), None
+        left = 0 if self._state is None else len(self._state.notes.episodes)
+        self._taken_out += taken
+        names = ", ".join(each.episode or f"all of {each.recording}" for each in taken)
+        self._say(f"episode {names}: discarded since, and taken out of {self._root.name}, which has {left} left")
+        for file in files:  # something that did not fit may fit now
             file.again = True
-            self._say(f"{name}, {self._root.name} cannot be written, and is tried again: {error}")
-        else:
-            left = 0 if self._state is None else len(self._state.notes.episodes)
-            self._say(f"{name}, and is taken out of {self._root.name}, which has {left} left")
+            index = file.growing.index
+            file.passed = {
+                key
+                for key in file.passed
+                if key == FILE or not any(each.shared(index.recording, index.epoch, key[1], key[2]) for each in taken)
+            }
 
     def _is_new(self, file: _File, stretch: Stretch) -> bool:
+        own = _events(stretch)
+        if any(each.has(stretch.info.part, stretch.episode, own) for each in self._discarded):
+            self._pass_over(file, _key(stretch), left_out(stretch.path, stretch.episode, DISCARDED))
+            return False
         found = None if self._state is None else present(self._state.notes.episodes, stretch)
         if found is None:
             return _key(stretch) not in file.passed
@@ -239,3 +296,19 @@ def _age(path: Path) -> tuple[str, int]:
 
 def _key(stretch: Stretch) -> Key:
     return stretch.episode, stretch.first_event, stretch.last_event
+
+
+def _events(stretch: Stretch) -> EventRange:
+    return event_range(stretch.info.recording, stretch.info.epoch, stretch.first_event, stretch.last_event)
+
+
+def _options_of(state: DatasetState, chosen: DatasetOptions) -> DatasetOptions:
+    """Return the options of a dataset, for one that takes its place."""
+    notes = state.notes
+    return msgspec.structs.replace(
+        chosen,
+        tolerance=notes.tolerance,
+        fps=state.fps if notes.has_rate else None,
+        cameras=[topic.removeprefix(CAMERA) for topic in notes.topics],
+        layout=notes.layout,
+    )

@@ -6,35 +6,48 @@ and no other file takes its number. Where some stay, they are written into a new
 read before about a file holds as long as the file is there.
 """
 
+import errno
 import os
 import shutil
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import av
 import msgspec
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from lockstep.server.recording.dataset.commit import STAGE
+from lockstep.server.recording.dataset.commit import commit, stage_of
 from lockstep.server.recording.dataset.exchange import exchanged
-from lockstep.server.recording.errors import RecordingDamaged
-from lockstep.server.recording.export.lerobot_batch import METADATA, DatasetState, write_metadata, write_table
+from lockstep.server.recording.errors import DatasetRefused, RecordingDamaged
+from lockstep.server.recording.export.lerobot_batch import (
+    METADATA,
+    DatasetState,
+    write_metadata,
+    write_notes,
+    write_table,
+)
 from lockstep.server.recording.export.lerobot_meta import (
+    DatasetEpisode,
     DatasetNotes,
+    EventRange,
     file_of,
     merged_statistics,
     place_of,
     statistics_of,
 )
 from lockstep.server.recording.export.lerobot_video import copy_pictures
-from lockstep.server.recording.export.unfinished import unfinished_folder
 
-__all__ = ["remove"]
+__all__ = ["Discarded", "Removed", "complete_deletion", "event_range", "remove"]
+
+_notes_decoder = msgspec.json.Decoder(DatasetNotes)
 
 Row = dict[str, Any]
 STATISTICS = "stats/"
+WITHOUT_LINKS = (errno.EPERM, errno.EOPNOTSUPP, errno.EMLINK)  # of the file system, of this kind of file, any more
 NUMBERED = ("index", "episode_index", "task_index")  # columns that say a place in the dataset
 
 
@@ -54,27 +67,121 @@ class _File(NamedTuple):
     is_whole: bool  # all its episodes stay
 
 
-def remove(root: Path, state: DatasetState, numbers: Collection[int]) -> DatasetState | None:
-    """Take episodes out, by their numbers; `alone_with` it.
+class Discarded(NamedTuple):
+    """An episode of a recording that is in no dataset any more."""
 
-    Returns:
-        the state of what is left; None: nothing is, and there is no dataset any more
+    part: int
+    episode: str
+    range: EventRange
+
+    def has(self, part: int, episode: str, events: EventRange) -> bool:
+        """Return whether an episode, of a recording or a dataset, is this one, trimmed or not, or shares events."""
+        own = self.range
+        is_it = (own.recording, self.part, self.episode) == (events.recording, part, episode)
+        return is_it or bool(own.shared(events.recording, events.epoch, events.first_event, events.last_event))
+
+
+class Removed(NamedTuple):
+    """
+    Attributes:
+        state: of the dataset; None: nothing is left of it, and there is no dataset any more
+        episodes: that were taken out
+    """
+
+    state: DatasetState | None
+    episodes: list[DatasetEpisode]
+
+
+def remove(root: Path, state: DatasetState, discarded: Sequence[Discarded]) -> Removed:
+    """Take out all episodes that have something of the discarded ones; `alone_with` it.
+
+    Files that others have put into the folder stay.
 
     Raises:
-        DatasetRefused: the file system exchanges no folders. The dataset is as it was, as after each error.
+        DatasetRefused: the file system exchanges no folders, or the dataset is not all in one. The dataset is as it
+            was, as after each error.
         RecordingDamaged: it cannot be read.
         OSError: it cannot be written.
     """
     root = root.resolve()
-    if not set(range(len(state.notes.episodes))) - set(numbers):
-        with unfinished_folder(root) as folder:
-            root.rename(folder / root.name)
-        return None
+    notes = state.notes
+    out = [number for number, each in enumerate(notes.episodes) if _is_any(each, discarded)]
+    without = [each for each in notes.without_rows if not _is_any(each, discarded)]
+    notes = msgspec.structs.replace(notes, without_rows=without)
+    taken = [notes.episodes[number] for number in out]
+    if not out:
+        if without != state.notes.without_rows:
+            commit(root, [write_notes(stage_of(root), notes)])
+        return Removed(msgspec.structs.replace(state, notes=notes), taken)
+    _check_folders(root, notes)
+    if len(out) == len(notes.episodes):
+        _delete(root, notes)
+        return Removed(None, taken)
+    ranges = [event_range(each.recording, each.epoch, each.first_event, each.last_event) for each in taken]
+    notes = msgspec.structs.replace(notes, version=3, taken_out=[*notes.taken_out, *ranges])
     try:
+        files = _files(root, notes, out)
         with exchanged(root) as new:
-            return _Removal(root, new, state, _files(root, state.notes, numbers)).state
-    except (pa.ArrowException, KeyError, IndexError) as error:
+            made = _Removal(root, new, msgspec.structs.replace(state, notes=notes), files).state
+            _link_others(root, new, notes)
+    except FileNotFoundError as error:
+        raise RecordingDamaged(f"{root.name}: {error.filename} is missing") from error
+    except (pa.ArrowException, av.FFmpegError, KeyError, IndexError, TypeError, ValueError) as error:
+        if isinstance(error, OSError):  # of FFmpeg: the disk is full
+            raise
         raise RecordingDamaged(f"{root.name}: {error}") from error
+    return Removed(made, taken)
+
+
+def event_range(recording: str, epoch: str, first_event: int, last_event: int) -> EventRange:
+    """Return the range of these events."""
+    return EventRange(recording=recording, epoch=epoch, first_event=first_event, last_event=last_event)
+
+
+def _is_any(noted: DatasetEpisode, discarded: Sequence[Discarded]) -> bool:
+    return any(each.has(noted.part, noted.episode, noted) for each in discarded)
+
+
+def complete_deletion(root: Path) -> None:
+    """Delete what is left of a dataset whose deletion was interrupted; `alone_with` it. Raises OSError."""
+    notes, info = root / "meta/lockstep.json", root / "meta/info.json"
+    if info.exists() or not notes.is_file():
+        return
+    with suppress(msgspec.DecodeError):  # it is not of Lockstep
+        _delete(root, _notes_decoder.decode(notes.read_bytes()))
+
+
+def _check_folders(root: Path, notes: DatasetNotes) -> None:
+    """Raise DatasetRefused where a file of the dataset could be elsewhere: it would be changed there, or stay."""
+    if any("/" in key or key in ("", ".", "..") for key in notes.cameras):
+        raise DatasetRefused(f"{root.name} names a camera in a way that Lockstep does not")
+    for kind in ("data", "meta", "videos"):
+        for folder, names, _ in os.walk(root / kind):
+            links = [name for name in (".", *names) if (Path(folder) / name).is_symlink()]
+            if links or (root / kind).is_symlink():
+                raise DatasetRefused(f"{folder} is, or has, a link to a folder elsewhere")
+
+
+def _delete(root: Path, notes: DatasetNotes) -> None:
+    """Delete a dataset's own files, and the folders that are empty then. It is none as soon as the first is gone."""
+    *others, info = METADATA
+    (root / info).unlink(missing_ok=True)
+    for file in notes.files:
+        for path in _paths(file, notes):
+            if not (root / path).exists() and path.startswith("data/"):
+                break  # whoever wrote the notes may have written any number of files
+            (root / path).unlink(missing_ok=True)
+        else:
+            continue
+        break
+    for path in others:
+        (root / path).unlink(missing_ok=True)
+    for folder, _, _ in sorted(os.walk(root), reverse=True):
+        with suppress(OSError):  # it is not empty
+            if Path(folder) != root:
+                os.rmdir(folder)
+    with suppress(OSError):  # not empty, a mount, or somebody's who may not
+        root.rmdir()
 
 
 def _files(root: Path, notes: DatasetNotes, numbers: Collection[int]) -> list[_File]:
@@ -108,7 +215,6 @@ class _Removal:
         self._episode = self._row = 0  # numbers of the next ones
         self._drivers: dict[str, None] = {}
         self._parts: list[dict[str, Any]] = []  # statistics of each episode
-        _link_others(root, new, state.notes)
         for file in files:
             self._write(file)
         self.state = self._new_state(files)
@@ -178,7 +284,7 @@ class _Removal:
     def _new_state(self, files: Sequence[_File]) -> DatasetState:
         before = self._before
         old = [place["episode_index"] for file in files for place in file.places]
-        batches = max(before.notes.batches, *(file.number + 1 for file in files))
+        batches = max(before.notes.batches, *(file.number + 1 for file in files), 1)
         there = {file.number for file in files}
         notes = msgspec.structs.replace(
             before.notes,
@@ -230,8 +336,6 @@ def _link_others(root: Path, new: Path, notes: DatasetNotes) -> None:
     """Link all files but those that are written anew, such as somebody's README."""
     own = {path for file in notes.files for path in _paths(file, notes)} | set(METADATA)
     for folder, folders, names in os.walk(root):
-        if STAGE in folders and Path(folder) == root:
-            folders.remove(STAGE)
         links = [name for name in folders if (Path(folder) / name).is_symlink()]
         for name in [*names, *links]:
             path = (Path(folder) / name).relative_to(root)
@@ -248,5 +352,7 @@ def _link(source: Path, target: Path) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
         os.link(source, target, follow_symlinks=False)
-    except OSError:  # a file system without links
+    except OSError as error:
+        if error.errno not in WITHOUT_LINKS:
+            raise
         shutil.copy2(source, target, follow_symlinks=False)

@@ -20,6 +20,7 @@ __all__ = [
     "DatasetEpisode",
     "DatasetNotes",
     "EpisodePlace",
+    "EventRange",
     "Statistics",
     "episodes_table",
     "file_of",
@@ -49,23 +50,13 @@ RATE = (
 )
 
 
-class DatasetEpisode(msgspec.Struct, frozen=True, kw_only=True):
-    """Where an episode of the dataset comes from."""
+class EventRange(msgspec.Struct, frozen=True, kw_only=True):
+    """Events of a recording."""
 
     recording: str
-    part: int
     epoch: str
-    episode: str  # id; "": the recording as a whole
     first_event: int
     last_event: int
-    task: str
-    outcome: str
-    rows: int
-    left_out: int  # events that are in no row because a picture was too old
-    rate: float = 0.0  # Hz, by the median interval of its events; 0: not known
-    recorded: tuple[str, ...] = ()  # ids of the recorded episodes that it was made of; empty: an earlier version, whole
-    commands: EpisodeCommands | None = None  # None: not known, of an earlier version
-    marks: tuple[tuple[Whole, str], ...] = ()  # event, words: what somebody marked in it
 
     def shared(self, recording: str, epoch: str, first_event: int, last_event: int) -> range:
         """Return which of these events are among its own, by their distance from the first one.
@@ -78,16 +69,32 @@ class DatasetEpisode(msgspec.Struct, frozen=True, kw_only=True):
         return range(first, min(event_gap(last_event, first_event), event_gap(self.last_event, first_event)))
 
 
+class DatasetEpisode(EventRange, frozen=True, kw_only=True):
+    """Where an episode of the dataset comes from."""
+
+    part: int
+    episode: str  # id; "": the recording as a whole
+    task: str
+    outcome: str
+    rows: int
+    left_out: int  # events that are in no row because a picture was too old
+    rate: float = 0.0  # Hz, by the median interval of its events; 0: not known
+    recorded: tuple[str, ...] = ()  # ids of the recorded episodes that it was made of; empty: an earlier version, whole
+    commands: EpisodeCommands | None = None  # None: not known, of an earlier version
+    marks: tuple[tuple[Whole, str], ...] = ()  # event, words: what somebody marked in it
+
+
 class DatasetNotes(msgspec.Struct, frozen=True, kw_only=True):
     """meta/lockstep.json: what LeRobot has no place for."""
 
-    version: Literal[1, 2] = 2
+    version: Literal[1, 2, 3] = 2  # 3: something was taken out, which earlier versions do not reckon with
     rule: str = RULE
     sampling: str = EVENTS
     has_rate: bool = False  # the dataset has a rate of its own, and an event may be in several rows
     tolerance: int  # events
     batches: int = 1  # number of files of each kind, those that are gone included
     gone: list[int] = []  # numbers of the files that were deleted, with the episodes in them
+    taken_out: list[EventRange] = []  # episodes that were: what is kept of their events may come in again
     cameras: list[str]  # in the order of `lockstep.stamp`
     topics: list[str] = []  # of the cameras in recordings, in the same order
     drivers: list[str] = []  # names of all that drove

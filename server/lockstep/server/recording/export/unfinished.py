@@ -52,10 +52,12 @@ def unfinished_folder(target: Path) -> Iterator[Path]:
         with tempfile.NamedTemporaryFile(dir=folder, delete=False) as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             os.rename(lock.name, folder / LOCK)
-            yield folder
-            shutil.rmtree(folder, ignore_errors=True)
+            try:
+                yield folder
+            finally:
+                _delete(folder)
     except BaseException:
-        shutil.rmtree(folder, ignore_errors=True)
+        _delete(folder)
         raise
 
 
@@ -91,10 +93,27 @@ def remove_stale(directory: Path, name: str | None = None) -> list[Path]:
     """Remove the unfinished folders that no process owns, and return those that were removed. Raises OSError."""
     removed = []
     for path in stale_folders(directory, name):
-        shutil.rmtree(path, ignore_errors=True)
+        _delete(path)
         if not path.exists():
             removed.append(path)
     return removed
+
+
+def _delete(folder: Path) -> None:
+    """Delete the folder, its lock last: whatever ends this before, what is left is known by the lock."""
+    with suppress(FileNotFoundError):
+        for path in folder.iterdir():
+            if path.name == LOCK:
+                continue
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                with suppress(OSError):
+                    path.unlink()
+    with suppress(OSError):
+        if [path.name for path in folder.iterdir()] == [LOCK]:
+            (folder / LOCK).unlink()
+        folder.rmdir()
 
 
 def _is_free(lock: Path) -> bool:

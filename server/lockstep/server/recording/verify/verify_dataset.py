@@ -87,6 +87,7 @@ def verify_dataset(root: Path, *, pixels: bool = False, recordings: Path | None 
         checks: dict[DatasetCheckName, DatasetCheck] = {name: DatasetCheck() for name in CHECKS}
         _check_rows(checks, notes, info["fps"], rows)
         _check_counts(checks["counted"], root, notes, info, rows, places)
+        _check_files(checks["counted"], root, notes)
         for file, part in zip(notes.files, parts, strict=True):
             for place, camera in enumerate(notes.cameras):
                 video = root / "videos" / camera / f"{file}.mp4"
@@ -186,6 +187,16 @@ def _is_in(event: int, episode: DatasetEpisode) -> bool:
     if not is_event(event):
         return False
     return event_gap(event, episode.first_event) >= 0 and event_gap(episode.last_event, event) >= 0
+
+
+def _check_files(check: DatasetCheck, root: Path, notes: DatasetNotes) -> None:
+    """Look for files that the dataset does not say: LeRobot reads all that it finds."""
+    said = set(notes.files)
+    videos = [(f"videos/{camera}", "mp4") for camera in notes.cameras]
+    for kind, ending in (("data", "parquet"), ("meta/episodes", "parquet"), *videos):
+        for path in (root / kind).glob(f"*/*.{ending}"):
+            name = path.relative_to(root / kind).with_suffix("").as_posix()
+            check.look(name in said, -1, f"{path.relative_to(root)} is no file of the dataset's")
 
 
 def _check_counts(
