@@ -139,9 +139,7 @@ async def test_before_the_first_motion_the_robot_warns_and_the_page_counts_down(
         await operator.arm()
         for page in (operator, observer):
             await _warned(page).wait_for()
-        await operator.pad.press(RB)
-        await operator.pad.tilt(1, -1)
-        await operator.until("s.driving && s.at_rest === false")
+        await operator.drive_forward({1: -1})
         assert (await operator.stats())["armed"], "the warning has not disarmed"
         await _warned(operator).wait_for(state="hidden")
         at_work = [each for each in robot.applied if each != (False, False)]
