@@ -17,7 +17,7 @@ from lockstep.server.cli.recordings.follow import append_once
 from lockstep.server.recording.dataset import exchange
 from lockstep.server.recording.dataset import follower as follower_module
 from lockstep.server.recording.dataset.appending import alone_with, is_dataset, read_state
-from lockstep.server.recording.errors import DatasetRefused
+from lockstep.server.recording.errors import DatasetRefused, RecordingDamaged
 from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.export.export_lerobot import DatasetOptions
 from lockstep.server.recording.format.records import Degraded
@@ -157,7 +157,8 @@ def test_when_all_are_discarded_there_is_no_dataset_and_the_next_kept_one_begins
     change(path, *({"episode": each, "dropped": True} for each in "acf"))
     said = appended(path, root)
     assert said[0] == "episode a, c, f: discarded since, and taken out of dataset, which has 0 left"
-    assert not root.exists()
+    assert not is_dataset(root)
+    assert list(files_of(root)) == ["meta/lockstep.json"]
     assert not beside(root)
     change(path, {"episode": "c", "dropped": False})
     appended(path, root)
@@ -201,7 +202,7 @@ def test_where_folders_cannot_be_exchanged_it_stays_and_is_named_once(
     change(path, {"episode": "f", "task": "pull"})
     following.look([path])
     following.look([path])
-    assert [each for each in said if "stays" in each] == ["what dataset has of discarded episodes (c) stays: planted"]
+    assert [each for each in said if "stays" in each] == ["what dataset has of discarded episodes stays: planted"]
     assert files_of(root) == before
     assert not beside(root)
 
@@ -219,7 +220,7 @@ def test_on_a_full_disk_the_dataset_is_as_it_was_and_the_episode_leaves_it_when_
         change(path, {"episode": "c", "dropped": True})
         for _ in range(2):
             following.look([path])
-            assert said[-1].startswith("what dataset has of discarded episodes (c) is tried again: ")
+            assert said[-1].startswith("what dataset has of discarded episodes is tried again: ")
             assert files_of(root) == before
             assert not beside(root)
         ballast.unlink()
@@ -324,8 +325,12 @@ def test_what_others_have_put_into_the_folder_stays_when_the_last_episode_goes(t
     appended(path, root)
     change(path, *({"episode": each, "dropped": True} for each in "acf"))
     appended(path, root)
-    assert sorted(files_of(root)) == ["README.md", "recordings/a.episodes.jsonl", "recordings/a.mcap"]
-    assert not (root / "data").exists()
+    assert sorted(files_of(root)) == [
+        "README.md",
+        "meta/lockstep.json",
+        "recordings/a.episodes.jsonl",
+        "recordings/a.mcap",
+    ]
 
 
 def test_a_dataset_that_begins_anew_has_the_options_of_the_one_before(tmp_path: Path) -> None:
@@ -337,13 +342,52 @@ def test_a_dataset_that_begins_anew_has_the_options_of_the_one_before(tmp_path: 
     assert (state.fps, state.notes.has_rate, state.notes.tolerance) == (10, True, 2)
 
 
-def test_a_deletion_that_was_interrupted_is_completed_before_a_dataset_begins(tmp_path: Path) -> None:
+def test_files_of_a_dataset_that_lost_its_info_are_not_mixed_with_those_of_another(tmp_path: Path) -> None:
     path, root = grown(tmp_path)
     (root / "meta" / "info.json").unlink()
-    change(path, *({"episode": each, "dropped": True} for each in "af"))
-    appended(path, root)
-    assert events_of(root) == [C]
+    before = files_of(root)
+    with pytest.raises(RecordingDamaged, match=r"no meta/info.json"):
+        appended(path, root)
+    assert files_of(root) == before
+
+
+@pytest.mark.parametrize("restarted", [False, True])
+def test_the_only_episode_comes_in_again_when_it_is_put_back_however_old_it_is(tmp_path: Path, restarted: bool) -> None:
+    path, root = recording(tmp_path / "a.mcap", *RECORDS[2:6]), tmp_path / "dataset"
+    append_once([path], root, DatasetOptions(fps=10), lambda _: None)
+    following = follower(root)
+    for dropped in (True, False):
+        change(path, {"episode": "c", "dropped": dropped})
+        following.look([path], since=2**60)
+        following = follower(root) if restarted else following
+    assert {row["lockstep.event"] for row in all_rows(root)} <= set(C)
     assert verify_dataset(root).ok
+    assert read_state(root).fps == 10
+
+
+def test_changes_of_one_name_in_two_copies_of_a_recording_are_two(tmp_path: Path) -> None:
+    path, root = recording(tmp_path / "a.mcap", *RECORDS), tmp_path / "dataset"
+    copy = Path(shutil.copy(path, tmp_path / "b.mcap"))
+    change(path, {"episode": "c", "split": 50})
+    appended(path, root)
+    change(copy, {"episode": "f", "split": 80}, {"episode": "edit-1a", "dropped": True})
+    for paths in ([path, copy], [copy, path]):
+        append_once(paths, root, DatasetOptions(), lambda _: None)
+        events = {event for each in events_of(root) for event in each}
+        assert events >= {*A, *C}, "the first part of c is kept, whatever became of that of f"
+        assert not events & {*range(70, 80)}
+
+
+def test_an_episode_that_was_trimmed_to_other_events_and_discarded_comes_in_when_it_is_put_back(tmp_path: Path) -> None:
+    path, root = recording(tmp_path / "a.mcap", *RECORDS), tmp_path / "dataset"
+    change(path, {"episode": "c", "first_event": 55})
+    following = follower(root)
+    following.look([path])
+    changes: list[dict[str, Any]] = [{"first_event": 45, "last_event": 52}, {"dropped": True}, {"dropped": False}]
+    for one in changes:
+        change(path, {"episode": "c", **one})
+        following.look([path], since=2**60)
+    assert events_of(root) == [A, F, [*range(45, 52)]]
 
 
 def test_a_copy_without_the_changes_brings_no_discarded_episode_back(tmp_path: Path) -> None:
@@ -456,16 +500,17 @@ def test_a_dataset_behind_a_link_begins_anew_there_when_all_were_discarded_and_o
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount a small disk")
-def test_a_dataset_that_is_a_mount_stays_as_it_is_and_all_of_it_can_go(tmp_path: Path) -> None:
+@pytest.mark.parametrize("where", [".", "mine"])
+def test_a_dataset_that_is_a_mount_or_has_one_stays_as_it_is(tmp_path: Path, where: str) -> None:
     path, made = grown(tmp_path)
-    root = tmp_path / "mount"
-    root.mkdir()
-    with small_disk(root, 4 << 20):
+    root = tmp_path / "copy"
+    (root / where).mkdir(parents=True)
+    with small_disk(root / where, 4 << 20):
         shutil.copytree(made, root, dirs_exist_ok=True)
         before = files_of(root)
         change(path, {"episode": "c", "dropped": True})
         assert "stays: " in appended(path, root)[0]
-        assert files_of(root) == before
         change(path, *({"episode": each, "dropped": True} for each in "af"))
-        appended(path, root)
-        assert files_of(root) == {}
+        assert "stays: " in appended(path, root)[0]
+        assert files_of(root) == before
+        assert not beside(root)

@@ -64,7 +64,7 @@ def follow(
         follower = DatasetFollower(root, options, say)
         while True:
             with suppress(FileNotFoundError):  # the directory comes with the first recording
-                follower.look([path for path in files() if _changed(path) >= since / 1e6 - EARLIER], since)
+                follower.look([path for path in files() if _may_concern(path, since)], since)
             if ended.wait(LOOK_SECONDS):
                 return
 
@@ -78,13 +78,12 @@ def _since(memory: Path) -> int:
     return now
 
 
-def _changed(path: Path) -> float:
-    """Return when a recording or the changes to it were written last, s since 1970."""
-    found = 0.0
-    for each in (path, edits_path(path)):
-        with suppress(OSError):
-            found = max(found, each.stat().st_mtime)
-    return found
+def _may_concern(path: Path, since: int) -> bool:
+    """Return whether a recording may have new episodes, or changes, which may concern what the dataset has."""
+    try:
+        return path.stat().st_mtime >= since / 1e6 - EARLIER or edits_path(path).exists()
+    except OSError:
+        return False
 
 
 def _give_way() -> None:

@@ -19,7 +19,7 @@ from lockstep.server.recording.export.lerobot_meta import DatasetNotes
 from lockstep.server.recording.export.lerobot_rows import EpisodeRows
 from lockstep.server.recording.export.unfinished import remove_stale
 
-__all__ = ["alone_with", "append", "is_dataset", "note_without_rows", "read_state"]
+__all__ = ["alone_with", "append", "is_dataset", "note_without_rows", "notes_of_none", "read_state"]
 
 _notes_decoder = msgspec.json.Decoder(DatasetNotes)
 _json_decoder = msgspec.json.Decoder(dict[str, Any])
@@ -78,6 +78,25 @@ def read_state(root: Path) -> DatasetState:
     if notes.version < 2:
         raise DatasetRefused(f"{root.name} was made by an earlier version: export its recordings anew")
     return DatasetState(robot=robot, fps=fps, notes=notes, tasks=tasks, info=info, statistics=statistics)
+
+
+def notes_of_none(root: Path) -> DatasetNotes | None:
+    """Return the notes of a dataset of which no episode is left; None: there is nothing.
+
+    Raises:
+        RecordingDamaged: there is something else, that a new dataset would get mixed with.
+        OSError: it cannot be read.
+    """
+    path = root / "meta" / "lockstep.json"
+    if is_dataset(root) or not path.exists():
+        return None
+    try:
+        notes = _notes_decoder.decode(path.read_bytes())
+    except msgspec.DecodeError as error:
+        raise RecordingDamaged(f"{root.name}: {error}") from error
+    if notes.episodes:
+        raise RecordingDamaged(f"{root.name} has no meta/info.json, and files of a dataset")
+    return notes
 
 
 def append(root: Path, state: DatasetState, layout: DatasetLayout, episodes: Sequence[EpisodeRows]) -> None:

@@ -12,10 +12,10 @@ from pathlib import Path
 import msgspec
 
 from lockstep.protocol.description import RobotDescription
-from lockstep.server.recording.dataset.appending import append, is_dataset, note_without_rows, read_state
+from lockstep.server.recording.dataset.appending import append, is_dataset, note_without_rows, notes_of_none, read_state
 from lockstep.server.recording.dataset.commit import recover
 from lockstep.server.recording.dataset.growing import GrowingRecording
-from lockstep.server.recording.dataset.removing import Discarded, complete_deletion, event_range, remove
+from lockstep.server.recording.dataset.removing import event_range, remove
 from lockstep.server.recording.episodes.edit_rules import EditedEpisode, apply_edits
 from lockstep.server.recording.episodes.edits import edits_version, read_edits
 from lockstep.server.recording.errors import DatasetRefused, RecordingError
@@ -30,8 +30,8 @@ from lockstep.server.recording.export.export_lerobot import (
     not_as_a_whole,
 )
 from lockstep.server.recording.export.lerobot_batch import DatasetState
-from lockstep.server.recording.export.lerobot_layout import layout_of
-from lockstep.server.recording.export.lerobot_meta import DatasetEpisode, EventRange
+from lockstep.server.recording.export.lerobot_layout import DatasetLayout, layout_of
+from lockstep.server.recording.export.lerobot_meta import DatasetNotes, EventRange
 from lockstep.server.recording.export.lerobot_present import present
 from lockstep.server.recording.export.lerobot_rows import (
     EpisodeRows,
@@ -71,13 +71,15 @@ class _File:
     passed: set[Key] = field(default_factory=set)
 
     @property
-    def discarded(self) -> Iterator[Discarded]:
-        """Yield the episodes that were kept once and are no more. Only such a one can be in a dataset."""
+    def discarded(self) -> Iterator[EventRange]:
+        """Yield the bounds of episodes that were kept once and are no more: only such a one can be in a dataset.
+
+        Whatever it was trimmed to, no other episode has events of these.
+        """
         index = self.growing.index
         for each in self.episodes:
             if each.is_dropped:
-                first, last = each.entry.first_event, each.entry.last_event
-                yield Discarded(index.part, each.entry.id, event_range(index.recording, index.epoch, first, last))
+                yield event_range(index.recording, index.epoch, each.first_bound, each.last_bound)
 
 
 class DatasetFollower:
@@ -101,15 +103,15 @@ class DatasetFollower:
         self._options = options
         self._say = say
         self._wholes: Mapping[Path, str] | None = None  # None: files without episodes are left out
-        complete_deletion(root)
         self._state: DatasetState | None = read_state(root) if is_dataset(root) else None
+        self._emptied: DatasetNotes | None = None  # of a dataset without episodes, which the next one begins anew
+        self._begin_anew(notes_of_none(root))
         self._robot: RobotDescription | None = None
         self._files: dict[Path, _File] = {}  # those that were there at the last look
         self._without_rows: list[EpisodeRows] = []  # that the dataset is to note when it begins
-        self._discarded: Sequence[Discarded] = ()  # of all files at the last look
-        self._staying: set[Discarded] = set()  # of which it was said that they cannot be taken out
+        self._discarded: Sequence[EventRange] = ()  # of all files at the last look
+        self._staying: set[EventRange] = set()  # of which it was said that they cannot be taken out
         self._owes_removal = False  # the disk was full
-        self._taken_out: list[DatasetEpisode] = []
 
     def take_wholes(self, paths: Sequence[Path]) -> None:
         """Append those of these files that have no episodes too, each as one, where `whole_recordings` allows it."""
@@ -185,50 +187,54 @@ class DatasetFollower:
 
     def _is_due(self, stretch: Stretch, since: int) -> bool:
         """Return whether it ended late enough, or is kept of what was taken out."""
-        taken_out = [] if self._state is None else self._state.notes.taken_out
-        own = stretch.info.recording, stretch.info.epoch, stretch.first_event, stretch.last_event
-        return stretch.ended >= since or any(each.shared(*own) for each in (*taken_out, *self._taken_out))
+        notes = self._emptied if self._state is None else self._state.notes
+        return stretch.ended >= since or _is_of(stretch, [] if notes is None else notes.taken_out)
 
-    def _take_out(self, discarded: Sequence[Discarded], files: Sequence[_File]) -> None:
+    def _begin_anew(self, emptied: DatasetNotes | None) -> None:
+        """Let the next dataset have the options of one that has no episode any more."""
+        self._emptied, self._robot = emptied, None
+        if emptied is not None:
+            self._options = msgspec.structs.replace(
+                self._options,
+                tolerance=emptied.tolerance,
+                fps=emptied.fps or None,
+                cameras=[topic.removeprefix(CAMERA) for topic in emptied.topics],
+                layout=emptied.layout,
+            )
+
+    def _take_out(self, discarded: Sequence[EventRange], files: Sequence[_File]) -> None:
         """Take what the dataset has of discarded episodes out of it, under whatever ids it has it."""
-        self._discarded = discarded
+        self._discarded, self._owes_removal = discarded, False
+        self._staying &= set(discarded)
         new = [each for each in discarded if each not in self._staying]
-        before, self._owes_removal = self._state, False
-        if before is None or not new:
+        if self._state is None or not new:
             return
         try:
-            self._state, taken = remove(self._root, before, new)
+            self._state, notes, taken = remove(self._root, self._state, new)
         except (RecordingError, OSError) as error:
-            is_full = isinstance(error, OSError) and error.errno in FULL
-            self._owes_removal = is_full
-            if not is_full:
+            self._owes_removal = isinstance(error, OSError) and error.errno in FULL
+            if not self._owes_removal:
                 self._staying.update(new)
-            what = "is tried again" if is_full else "stays"
-            names = ", ".join(sorted({each.episode for each in new}))
-            self._say(f"what {self._root.name} has of discarded episodes ({names}) {what}: {error}")
+            what = "is tried again" if self._owes_removal else "stays"
+            self._say(f"what {self._root.name} has of discarded episodes {what}: {error}")
             recover(self._root)
             self._state = read_state(self._root) if is_dataset(self._root) else None
             return
         if not taken:
             return
         if self._state is None:
-            self._options, self._robot = _options_of(before, self._options), None
-        left = 0 if self._state is None else len(self._state.notes.episodes)
-        self._taken_out += taken
+            self._begin_anew(notes)
         names = ", ".join(each.episode or f"all of {each.recording}" for each in taken)
+        left = len(notes.episodes)
         self._say(f"episode {names}: discarded since, and taken out of {self._root.name}, which has {left} left")
+        changed = {(each.recording, each.epoch) for each in taken}
         for file in files:  # something that did not fit may fit now
             file.again = True
-            index = file.growing.index
-            file.passed = {
-                key
-                for key in file.passed
-                if key == FILE or not any(each.shared(index.recording, index.epoch, key[1], key[2]) for each in taken)
-            }
+            if (file.growing.index.recording, file.growing.index.epoch) in changed:
+                file.passed &= {FILE}
 
     def _is_new(self, file: _File, stretch: Stretch) -> bool:
-        own = _events(stretch)
-        if any(each.has(stretch.info.part, stretch.episode, own) for each in self._discarded):
+        if _is_of(stretch, self._discarded):
             self._pass_over(file, _key(stretch), left_out(stretch.path, stretch.episode, DISCARDED))
             return False
         found = None if self._state is None else present(self._state.notes.episodes, stretch)
@@ -276,10 +282,20 @@ class DatasetFollower:
             else:
                 self._without_rows.append(rows)
             raise DatasetRefused(no_rows(tolerance))
-        state = state or new_state(robot, layout, topics, self._options, [rows], self._without_rows)
+        state = state or self._first_state(robot, layout, topics, rows)
         append(self._root, state, layout, [rows])
         self._state, self._robot = state, robot
         return rows
+
+    def _first_state(
+        self, robot: RobotDescription, layout: DatasetLayout, topics: list[str], rows: EpisodeRows
+    ) -> DatasetState:
+        state, before = new_state(robot, layout, topics, self._options, [rows], self._without_rows), self._emptied
+        if before is not None:
+            state.notes = msgspec.structs.replace(
+                state.notes, version=3, batches=before.batches, gone=before.gone, taken_out=before.taken_out
+            )
+        return state
 
     def _pass_over(self, file: _File, key: Key, said: str) -> None:
         if key not in file.passed:
@@ -298,17 +314,7 @@ def _key(stretch: Stretch) -> Key:
     return stretch.episode, stretch.first_event, stretch.last_event
 
 
-def _events(stretch: Stretch) -> EventRange:
-    return event_range(stretch.info.recording, stretch.info.epoch, stretch.first_event, stretch.last_event)
-
-
-def _options_of(state: DatasetState, chosen: DatasetOptions) -> DatasetOptions:
-    """Return the options of a dataset, for one that takes its place."""
-    notes = state.notes
-    return msgspec.structs.replace(
-        chosen,
-        tolerance=notes.tolerance,
-        fps=state.fps if notes.has_rate else None,
-        cameras=[topic.removeprefix(CAMERA) for topic in notes.topics],
-        layout=notes.layout,
-    )
+def _is_of(stretch: Stretch, ranges: Sequence[EventRange]) -> bool:
+    """Return whether it has events of one of the ranges."""
+    own = stretch.info.recording, stretch.info.epoch, stretch.first_event, stretch.last_event
+    return any(each.shared(*own) for each in ranges)

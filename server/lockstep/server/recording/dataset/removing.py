@@ -21,7 +21,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from lockstep.server.recording.dataset.commit import commit, stage_of
-from lockstep.server.recording.dataset.exchange import exchanged
+from lockstep.server.recording.dataset.exchange import exchanged, raised
 from lockstep.server.recording.errors import DatasetRefused, RecordingDamaged
 from lockstep.server.recording.export.lerobot_batch import (
     METADATA,
@@ -41,12 +41,11 @@ from lockstep.server.recording.export.lerobot_meta import (
 )
 from lockstep.server.recording.export.lerobot_video import copy_pictures
 
-__all__ = ["Discarded", "Removed", "complete_deletion", "event_range", "remove"]
-
-_notes_decoder = msgspec.json.Decoder(DatasetNotes)
+__all__ = ["Removed", "event_range", "remove"]
 
 Row = dict[str, Any]
 STATISTICS = "stats/"
+MALFORMED = (KeyError, IndexError, TypeError, ValueError, FileNotFoundError)  # what damaged metadata raise
 WITHOUT_LINKS = (errno.EPERM, errno.EOPNOTSUPP, errno.EMLINK)  # of the file system, of this kind of file, any more
 NUMBERED = ("index", "episode_index", "task_index")  # columns that say a place in the dataset
 
@@ -67,35 +66,24 @@ class _File(NamedTuple):
     is_whole: bool  # all its episodes stay
 
 
-class Discarded(NamedTuple):
-    """An episode of a recording that is in no dataset any more."""
-
-    part: int
-    episode: str
-    range: EventRange
-
-    def has(self, part: int, episode: str, events: EventRange) -> bool:
-        """Return whether an episode, of a recording or a dataset, is this one, trimmed or not, or shares events."""
-        own = self.range
-        is_it = (own.recording, self.part, self.episode) == (events.recording, part, episode)
-        return is_it or bool(own.shared(events.recording, events.epoch, events.first_event, events.last_event))
-
-
 class Removed(NamedTuple):
     """
     Attributes:
-        state: of the dataset; None: nothing is left of it, and there is no dataset any more
+        state: of what is left; None: no episode is
+        notes: of the dataset, also where no episode is left
         episodes: that were taken out
     """
 
     state: DatasetState | None
+    notes: DatasetNotes
     episodes: list[DatasetEpisode]
 
 
-def remove(root: Path, state: DatasetState, discarded: Sequence[Discarded]) -> Removed:
-    """Take out all episodes that have something of the discarded ones; `alone_with` it.
+def remove(root: Path, state: DatasetState, discarded: Sequence[EventRange]) -> Removed:
+    """Take out all episodes that have discarded events; `alone_with` it.
 
-    Files that others have put into the folder stay.
+    Files that others have put into the folder stay. Where no episode is left, the notes do, for a dataset that begins
+    anew (`notes_of_none`).
 
     Raises:
         DatasetRefused: the file system exchanges no folders, or the dataset is not all in one. The dataset is as it
@@ -103,8 +91,7 @@ def remove(root: Path, state: DatasetState, discarded: Sequence[Discarded]) -> R
         RecordingDamaged: it cannot be read.
         OSError: it cannot be written.
     """
-    root = root.resolve()
-    notes = state.notes
+    root, notes = root.resolve(), state.notes
     out = [number for number, each in enumerate(notes.episodes) if _is_any(each, discarded)]
     without = [each for each in notes.without_rows if not _is_any(each, discarded)]
     notes = msgspec.structs.replace(notes, without_rows=without)
@@ -112,25 +99,24 @@ def remove(root: Path, state: DatasetState, discarded: Sequence[Discarded]) -> R
     if not out:
         if without != state.notes.without_rows:
             commit(root, [write_notes(stage_of(root), notes)])
-        return Removed(msgspec.structs.replace(state, notes=notes), taken)
-    _check_folders(root, notes)
-    if len(out) == len(notes.episodes):
-        _delete(root, notes)
-        return Removed(None, taken)
+        return Removed(msgspec.structs.replace(state, notes=notes), notes, taken)
+    _check(root, notes)
+    matched = [each for each in discarded if any(_is_any(one, [each]) for one in taken)]
     ranges = [event_range(each.recording, each.epoch, each.first_event, each.last_event) for each in taken]
-    notes = msgspec.structs.replace(notes, version=3, taken_out=[*notes.taken_out, *ranges])
+    notes = msgspec.structs.replace(
+        notes, version=3, taken_out=list(dict.fromkeys([*notes.taken_out, *ranges, *matched]))
+    )
+    before = msgspec.structs.replace(state, notes=notes)
     try:
         files = _files(root, notes, out)
-        with exchanged(root) as new:
-            made = _Removal(root, new, msgspec.structs.replace(state, notes=notes), files).state
-            _link_others(root, new, notes)
-    except FileNotFoundError as error:
-        raise RecordingDamaged(f"{root.name}: {error.filename} is missing") from error
-    except (pa.ArrowException, av.FFmpegError, KeyError, IndexError, TypeError, ValueError) as error:
-        if isinstance(error, OSError):  # of FFmpeg: the disk is full
+        with exchanged(root, lambda new: _link_others(root, new, notes)) as new:
+            made = _Removal(root, new, before, files).state if files else _none_left(before)
+            write_notes(new, made.notes)
+    except (pa.ArrowException, av.FFmpegError, ArithmeticError, AttributeError, *MALFORMED) as error:
+        if isinstance(error, OSError) and not isinstance(error, FileNotFoundError):  # of FFmpeg: the disk is full
             raise
         raise RecordingDamaged(f"{root.name}: {error}") from error
-    return Removed(made, taken)
+    return Removed(made if files else None, made.notes, taken)
 
 
 def event_range(recording: str, epoch: str, first_event: int, last_event: int) -> EventRange:
@@ -138,50 +124,32 @@ def event_range(recording: str, epoch: str, first_event: int, last_event: int) -
     return EventRange(recording=recording, epoch=epoch, first_event=first_event, last_event=last_event)
 
 
-def _is_any(noted: DatasetEpisode, discarded: Sequence[Discarded]) -> bool:
-    return any(each.has(noted.part, noted.episode, noted) for each in discarded)
+def _is_any(noted: DatasetEpisode, discarded: Sequence[EventRange]) -> bool:
+    events = noted.recording, noted.epoch, noted.first_event, noted.last_event
+    return any(each.shared(*events) for each in discarded)
 
 
-def complete_deletion(root: Path) -> None:
-    """Delete what is left of a dataset whose deletion was interrupted; `alone_with` it. Raises OSError."""
-    notes, info = root / "meta/lockstep.json", root / "meta/info.json"
-    if info.exists() or not notes.is_file():
-        return
-    with suppress(msgspec.DecodeError):  # it is not of Lockstep
-        _delete(root, _notes_decoder.decode(notes.read_bytes()))
+def _none_left(state: DatasetState) -> DatasetState:
+    """Return the state of a dataset without episodes: its notes alone."""
+    notes = msgspec.structs.replace(
+        state.notes,
+        gone=list(range(state.notes.batches)),
+        drivers=[],
+        episodes=[],
+        fps=state.fps if state.notes.has_rate else 0,
+    )
+    return msgspec.structs.replace(state, notes=notes)
 
 
-def _check_folders(root: Path, notes: DatasetNotes) -> None:
+def _check(root: Path, notes: DatasetNotes) -> None:
     """Raise DatasetRefused where a file of the dataset could be elsewhere: it would be changed there, or stay."""
-    if any("/" in key or key in ("", ".", "..") for key in notes.cameras):
+    if any("/" in key or "\0" in key or key in ("", ".", "..") for key in notes.cameras):
         raise DatasetRefused(f"{root.name} names a camera in a way that Lockstep does not")
     for kind in ("data", "meta", "videos"):
         for folder, names, _ in os.walk(root / kind):
             links = [name for name in (".", *names) if (Path(folder) / name).is_symlink()]
             if links or (root / kind).is_symlink():
                 raise DatasetRefused(f"{folder} is, or has, a link to a folder elsewhere")
-
-
-def _delete(root: Path, notes: DatasetNotes) -> None:
-    """Delete a dataset's own files, and the folders that are empty then. It is none as soon as the first is gone."""
-    *others, info = METADATA
-    (root / info).unlink(missing_ok=True)
-    for file in notes.files:
-        for path in _paths(file, notes):
-            if not (root / path).exists() and path.startswith("data/"):
-                break  # whoever wrote the notes may have written any number of files
-            (root / path).unlink(missing_ok=True)
-        else:
-            continue
-        break
-    for path in others:
-        (root / path).unlink(missing_ok=True)
-    for folder, _, _ in sorted(os.walk(root), reverse=True):
-        with suppress(OSError):  # it is not empty
-            if Path(folder) != root:
-                os.rmdir(folder)
-    with suppress(OSError):  # not empty, a mount, or somebody's who may not
-        root.rmdir()
 
 
 def _files(root: Path, notes: DatasetNotes, numbers: Collection[int]) -> list[_File]:
@@ -335,12 +303,13 @@ def _table_of(rows: Sequence[Row]) -> pa.Table:
 def _link_others(root: Path, new: Path, notes: DatasetNotes) -> None:
     """Link all files but those that are written anew, such as somebody's README."""
     own = {path for file in notes.files for path in _paths(file, notes)} | set(METADATA)
-    for folder, folders, names in os.walk(root):
+    for folder, folders, names in os.walk(root, onerror=raised):
         links = [name for name in folders if (Path(folder) / name).is_symlink()]
         for name in [*names, *links]:
             path = (Path(folder) / name).relative_to(root)
             if path.as_posix() not in own:
-                _link(root / path, new / path)
+                with suppress(FileNotFoundError):  # gone meanwhile
+                    _link(root / path, new / path)
 
 
 def _paths(file: str, notes: DatasetNotes) -> list[str]:

@@ -71,7 +71,7 @@ def write_batch(stage: Path, state: DatasetState, layout: DatasetLayout, episode
         DatasetRefused: the episodes do not fit the dataset.
         RecordingError, OSError: they cannot be read, or not be written.
     """
-    batch = 0 if not state.info else state.notes.batches
+    batch = state.notes.batches if state.info or state.notes.gone else 0
     state.tasks = list(dict.fromkeys([*state.tasks, *(each.stretch.task for each in episodes)]))
     cameras = _write_videos(stage, state, episodes, batch)
     parts = _columns_of_all(state, episodes)

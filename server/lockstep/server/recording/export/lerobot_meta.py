@@ -94,7 +94,8 @@ class DatasetNotes(msgspec.Struct, frozen=True, kw_only=True):
     tolerance: int  # events
     batches: int = 1  # number of files of each kind, those that are gone included
     gone: list[int] = []  # numbers of the files that were deleted, with the episodes in them
-    taken_out: list[EventRange] = []  # episodes that were: what is kept of their events may come in again
+    taken_out: list[EventRange] = []  # what is kept of these events may come in again
+    fps: int = 0  # of a dataset without an episode, that had a rate of its own; else meta/info.json says it
     cameras: list[str]  # in the order of `lockstep.stamp`
     topics: list[str] = []  # of the cameras in recordings, in the same order
     drivers: list[str] = []  # names of all that drove
