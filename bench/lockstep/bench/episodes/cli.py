@@ -12,7 +12,7 @@ import typer
 import uvloop
 
 from lockstep.bench.episodes.faults.fault_alone import run_fault
-from lockstep.bench.episodes.faults.fault_run import FAULTS, FaultName
+from lockstep.bench.episodes.faults.fault_run import ALONE, FAULTS, FaultName
 from lockstep.bench.episodes.faults.faulted_day import record_faulted_day
 from lockstep.bench.episodes.run import Choices, record_episodes
 from lockstep.bench.figures.kept_run import kept_run
@@ -53,6 +53,10 @@ def command(
 ) -> None:
     """Record episodes, export them, and look at each picture of the dataset; ends with 1 when something is wrong."""
     faults = _faults(fault or (["all"] if among else []))
+    if among and (alone := [each for each in faults if each in ALONE]):
+        if fault and "all" not in fault:
+            raise typer.BadParameter(f"{', '.join(alone)} is tried by itself only")
+        faults = [each for each in faults if each not in ALONE]
     choices = Choices(network, times, discard, redo, seed, pictures, keep)
     if discard + redo > times:
         raise typer.BadParameter("more episodes are discarded and redone than there are")

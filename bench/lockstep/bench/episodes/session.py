@@ -18,7 +18,7 @@ from lockstep.client import Console
 from lockstep.protocol.episodes import EpisodeOutcome
 from lockstep.protocol.messages import Feedback
 
-__all__ = ["Done", "Session", "drivers", "go_home", "visit"]
+__all__ = ["Done", "Session", "drivers", "visit"]
 
 CONNECT_SECONDS: Final = 60.0  # through a bad network, with a busy machine
 SILENCE_SECONDS: Final = 15.0
@@ -101,8 +101,6 @@ class Session:
                 await self._asks().episodes.keep(outcome, episode)
                 last = turns[-1].last_event
                 done.kept = Kept(episode, outcome, first, last, tuple(turns), DRIVERS[planned.person])
-            if self._asks().episodes.state.reset_action:
-                await go_home(await self.person())
         done.seconds = round(time.monotonic() - began, 1)
         self._say(_line(done))
         return done
@@ -218,22 +216,6 @@ async def visit(console: Console, goals: dict[str, float]) -> tuple[bool, int]:
     task = Visit(console.description, goals)
     armed = await operate(console, task)
     return task.reached, armed
-
-
-async def go_home(console: Console) -> None:
-    """Do the reset action that the console wants after an episode, if it wants one.
-
-    Raises:
-        ConsoleLost, ActionRefused, ActionCancelled: as `Console.act`.
-    """
-    async for _ in console.feedbacks():
-        state = console.episodes.state
-        if not state.reset_action or state.phase == "idle":
-            return
-        if state.phase == "resetting":
-            await console.arm()
-            await console.act(state.reset_action)
-            return
 
 
 async def _feedback(console: Console) -> Feedback:

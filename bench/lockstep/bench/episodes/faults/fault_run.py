@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final, Literal, get_args
 
 from lockstep.bench.episodes.dataset import Kept
-from lockstep.bench.episodes.session import go_home, visit
+from lockstep.bench.episodes.session import visit
 from lockstep.bench.episodes.turns import Turn
 from lockstep.bench.episodes.visits import places_near
 from lockstep.bench.harness.processes import Running
@@ -16,7 +16,7 @@ from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.client import ActionCancelled, ActionRefused, Console, ConsoleLost, EpisodeRefused
 from lockstep.protocol.episodes import EpisodeState
 
-__all__ = ["DISK_FAULTS", "FAULTS", "RESET", "ROBOT", "SECONDS", "TASK", "FaultName", "FaultRun", "following"]
+__all__ = ["ALONE", "DISK_FAULTS", "FAULTS", "RESET", "ROBOT", "SECONDS", "TASK", "FaultName", "FaultRun", "following"]
 
 FaultName = Literal[
     "kill-countdown",
@@ -34,6 +34,7 @@ FaultName = Literal[
     "camera-hangs",
 ]
 FAULTS: Final[tuple[FaultName, ...]] = get_args(FaultName)
+ALONE: Final = ("kill-reset", "kill-robot-reset")  # not among planned episodes, whose drivers drive no reset
 DISK_FAULTS: Final = ("disk-low", "disk-full")
 
 ROBOT: Final = "lockstep.bench.episodes.hanging_camera:HangingCameraArm"
@@ -106,9 +107,13 @@ class FaultRun:
         self.kept.append(episode)
 
     async def go_home(self) -> None:
-        """Do the reset action, until it is done or something ends it."""
+        """Do the reset action if the console waits for it, until it is done or something ends it."""
+        if not self.state.reset_action:
+            return
+        await self.until(lambda state: state.phase == "resetting", "that the robot has to go home")
         with suppress(ConsoleLost, ActionRefused, ActionCancelled):
-            await go_home(self.driver)
+            await self.driver.arm()
+            await self.driver.act(RESET)
 
     async def until_it_moves(self) -> None:
         """Wait until the reset action runs and the robot moves."""

@@ -5,14 +5,13 @@ from typing import Final
 
 from lockstep.bench.episodes.faults.console_faults import kill_countdown, kill_keeping, kill_open, kill_reset
 from lockstep.bench.episodes.faults.dataset_faults import LOW_BYTES, discard_late, fill_disk, kill_export
-from lockstep.bench.episodes.faults.fault_run import RESET, FaultName, FaultRun
+from lockstep.bench.episodes.faults.fault_run import ALONE, RESET, FaultName, FaultRun
 from lockstep.bench.episodes.faults.policy_fault import kill_policy
 from lockstep.bench.episodes.faults.robot_faults import camera_hangs, kill_robot, kill_robot_keeping, kill_robot_reset
 
 __all__ = ["meet", "settings_of"]
 
 LONG_COUNTDOWN: Final = "4"
-WITH_RESET: Final = ("kill-reset", "kill-robot-reset")
 
 
 async def meet(run: FaultRun) -> None:
@@ -26,7 +25,7 @@ def settings_of(fault: FaultName | None) -> dict[str, str]:
         "LOCKSTEP_RECORDING__AUTOMATIC": "true",
         "LOCKSTEP_RECORDING__FREE_BYTES": str(LOW_BYTES if fault == "disk-low" else 0),
         "LOCKSTEP_EPISODES__COUNTDOWN_SECONDS": LONG_COUNTDOWN if fault == "kill-countdown" else "0",
-        "LOCKSTEP_EPISODES__RESET_ACTION": RESET if fault in WITH_RESET else "",
+        "LOCKSTEP_EPISODES__RESET_ACTION": RESET if fault in ALONE else "",
     }
 
 

@@ -18,12 +18,12 @@ EVENTS: Final = 8  # that it drives before it is killed
 
 
 async def kill_policy(run: FaultRun) -> None:
-    name = DRIVERS[POLICY]
-    async with started((sys.executable, "-m", PROGRAM, run.policy_link, name)) as policy:
+    async with started((sys.executable, "-m", PROGRAM, run.policy_link, DRIVERS[POLICY])) as policy:
         peer = str((await policy.read(SECONDS))["peer"])
         episode = await run.driver.episodes.start(TASK)
         first = run.state.first_event
         await run.driver.rest()
+        name = await _name_of(run, peer)
         began = run.event
         await run.driver.policies.offer(peer)
         if not await _killed_as_it_drives(run, policy, began):
@@ -34,6 +34,16 @@ async def kill_policy(run: FaultRun) -> None:
         last = await run.drive()
     turns = (Turn(name, "policy", began + 1, ended), Turn(run.name, "human", ended + 1, last))
     await run.keep(Kept(episode, "success", first, last, turns, run.name))
+
+
+async def _name_of(run: FaultRun, peer: str) -> str:
+    """Return the name that the console gave it: "net 2" where somebody is called "net" already."""
+    async with asyncio.timeout(SECONDS):
+        async for _ in run.driver.feedbacks():
+            for each in run.driver.participants:
+                if each.peer == peer:
+                    return each.name
+    raise RuntimeError("the driver's feedbacks have ended")
 
 
 async def _killed_as_it_drives(run: FaultRun, policy: Running, began: int) -> bool:
