@@ -27,9 +27,6 @@ from lockstep.robot_bridge.watchdog.watchdogs import Watchdogs
 
 __all__ = ["TickLoop"]
 
-# s from a feedback until the next tick is prepared. The command that answers the feedback takes longer to come, and
-# whoever is to read the feedback may have to share the processors.
-GIVE_WAY = 0.001
 REST_MARGIN = 0.5  # s on top of hold for the robot to come to rest when the bridge closes
 MAX_CATCH_UP = 3  # ticks made good after the loop was blocked; the rest are skipped
 
@@ -107,8 +104,8 @@ class TickLoop:
         leaving.at_once()
         leaving.stop()
 
-    def tick(self) -> bool:
-        """Run one tick, and send a feedback if one is due. Return whether one was."""
+    def tick(self) -> None:
+        """Run one tick, and send a feedback if one is due."""
         now = self._now()
         feedback = self._executor.tick(now)
         if self._shaper.at_rest:
@@ -117,7 +114,7 @@ class TickLoop:
             self._publisher.publish_feedback(feedback)
         if (status := self._executor.status(now)) is not None:
             self._publisher.publish_to_operator(status)
-        return feedback is not None
+        self._robot.prepare()
 
     async def _tick_on(self) -> None:
         metronome = Ticker(self._robot.tick_seconds, time.monotonic(), catch_up=MAX_CATCH_UP)
@@ -125,10 +122,8 @@ class TickLoop:
             await self._wait(metronome)
             self._counters.skipped_ticks = metronome.skipped
             try:
-                is_fed_back = self.tick()
+                self.tick()
                 self._liveness.ticked()
-                if not is_fed_back or await self._alarm.pause(min(GIVE_WAY, self._robot.tick_seconds / 4)):
-                    self._robot.prepare()
             except BaseException as error:  # an adapter may raise one that ends the loop or cancels the task
                 raise RobotFailed(named(error)) from error
 

@@ -118,8 +118,8 @@ class Robot(ABC):
     def prepare(self) -> None:
         """Compute what the next `apply` and `tick` can use, whatever their values are, so that they take less time.
 
-        Called after each tick while the bridge runs, 1 ms after its feedback was sent if there was one, and not when a
-        command comes before. It must change nothing that the robot does.
+        Called after each tick while the bridge runs, when its feedback was sent. It must change nothing that the robot
+        does.
         """
 
     @abstractmethod
