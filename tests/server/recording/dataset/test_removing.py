@@ -17,6 +17,7 @@ from lockstep.server.cli.recordings.follow import append_once
 from lockstep.server.recording.dataset import exchange
 from lockstep.server.recording.dataset import follower as follower_module
 from lockstep.server.recording.dataset.appending import alone_with, is_dataset, read_state
+from lockstep.server.recording.dataset.commit import sync
 from lockstep.server.recording.errors import DatasetRefused, RecordingDamaged
 from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.export.export_lerobot import DatasetOptions
@@ -442,14 +443,14 @@ def test_after_an_error_behind_the_exchange_the_dataset_grows_on_as_it_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, root = in_one_file(tmp_path)
-    following, sync = follower(root), exchange._sync
+    following = follower(root)
 
     def fail(where: Path) -> None:
         if where == tmp_path:
             raise OSError(5, "planted")
         sync(where)
 
-    monkeypatch.setattr(exchange, "_sync", fail)
+    monkeypatch.setattr("lockstep.server.recording.dataset.exchange.sync", fail)
     change(path, {"episode": "c", "dropped": True})
     following.look([path])
     monkeypatch.undo()

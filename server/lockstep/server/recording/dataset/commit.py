@@ -12,7 +12,7 @@ from pathlib import Path
 
 import msgspec
 
-__all__ = ["STAGE", "commit", "is_interrupted", "recover", "stage_of"]
+__all__ = ["STAGE", "commit", "is_interrupted", "recover", "stage_of", "sync"]
 
 STAGE = ".append"
 JOURNAL = "journal.json"
@@ -37,14 +37,14 @@ def commit(root: Path, files: Sequence[str], replace: Callable[[Path, Path], Non
     """Let the staged files take their places. Raises OSError: nothing or all of it happens at the next `recover`."""
     stage = root / STAGE
     for file in files:
-        _sync(stage / file)
+        sync(stage / file)
     for folder in {(stage / file).parent for file in files}:
-        _sync(folder)
+        sync(folder)
     partial = stage / f"{JOURNAL}.partial"
     partial.write_bytes(msgspec.json.encode(Journal(list(files))))
-    _sync(partial)
+    sync(partial)
     partial.replace(stage / JOURNAL)
-    _sync(stage)
+    sync(stage)
     _complete(root, files, replace)
 
 
@@ -75,7 +75,7 @@ def _complete(root: Path, files: Sequence[str], replace: Callable[[Path, Path], 
         if source.exists():  # else it was moved before the interruption
             target.parent.mkdir(parents=True, exist_ok=True)
             replace(source, target)
-            _sync(target.parent)
+            sync(target.parent)
     (root / STAGE / JOURNAL).unlink()
     shutil.rmtree(root / STAGE)
 
@@ -90,7 +90,8 @@ def _journal(root: Path) -> Journal | None:
     return journal if inside else None
 
 
-def _sync(path: Path) -> None:
+def sync(path: Path) -> None:
+    """Write a file or a folder to the disk. Raises OSError."""
     number = os.open(path, os.O_RDONLY)
     try:
         os.fsync(number)

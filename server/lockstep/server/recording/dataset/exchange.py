@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from lockstep.server.recording.dataset.commit import sync
 from lockstep.server.recording.errors import DatasetRefused
 from lockstep.server.recording.export.unfinished import unfinished_folder
 
@@ -40,8 +41,8 @@ def exchanged(place: Path, last: Callable[[Path], None]) -> Iterator[Path]:
         last(new)
         _exchange(new, place)
         with suppress(OSError):  # it has happened: whoever called reads the new one
-            _sync(folder)
-            _sync(place.parent)
+            sync(folder)
+            sync(place.parent)
 
 
 def _try(folder: Path) -> None:
@@ -83,18 +84,10 @@ def _sync_written(new: Path) -> None:
         for name in names:
             path = Path(folder) / name
             if path.is_file() and not path.is_symlink() and path.stat().st_nlink == 1:
-                _sync(path)
-        _sync(Path(folder))
+                sync(path)
+        sync(Path(folder))
 
 
 def raised(error: OSError) -> None:
     """Raise it: for `os.walk`, which leaves out what it cannot read."""
     raise error
-
-
-def _sync(path: Path) -> None:
-    number = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(number)
-    finally:
-        os.close(number)

@@ -233,7 +233,6 @@ class _Removal:
             new = place | numbers | {"episode_index": self._episode}
             new |= {"dataset_from_index": self._row, "dataset_to_index": self._row + length}
             for key in self._before.notes.cameras:
-                fps = self._before.fps
                 new |= _folder_and_file(f"videos/{key}", file.number)
                 new |= {
                     f"videos/{key}/from_timestamp": begin / fps,
