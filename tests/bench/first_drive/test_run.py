@@ -11,6 +11,23 @@ from tests.support.ros2 import have_ros, ros_environment, ros_python
 NODE = Path(__file__).parents[3] / "docs" / "examples" / "ros2" / "turtlebot.py"
 STEPS = ["written", "links", "driven"]
 DRIVES = 20
+LOSING = """
+from my_arm import MyArm
+
+
+class Losing(MyArm):
+    def __init__(self):
+        super().__init__()
+        self.ticks, self.withheld = 0, False
+
+    def apply(self, values):
+        self.ticks += self.ticks > 0 or any(values)
+        self.withheld = 0 < self.ticks < 50 or (self.withheld and any(values))
+        super().apply([0.0, 0.0] if self.withheld else values)
+
+    def measure(self):
+        return super().measure()._replace(faults=["let go of the controls once"] if self.withheld else [])
+"""
 
 
 @pytest.mark.timeout(300)
@@ -30,6 +47,16 @@ async def test_a_robot_from_the_template_is_driven_and_shows_its_picture(tmp_pat
                 assert (picture.frame.width, picture.frame.height) == (320, 320)
                 break
             await console.rest()
+
+
+@pytest.mark.timeout(300)
+async def test_a_robot_that_is_lost_as_it_starts_is_driven_once_the_controls_were_let_go(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "losing.py").write_text(LOSING)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    async with driven_template(tmp_path, lambda _: None, robot="losing:Losing") as driven:
+        assert list(driven.seconds) == STEPS
 
 
 @pytest.mark.skipif(not have_ros(), reason="there are no wheels of ROS 2 for this machine")

@@ -17,6 +17,9 @@ LONGEST = 60.0  # s, until it moves
 async def drive_until_moved(link: str) -> int:
     """Drive the first axis until a joint has moved; return the event in which it had.
 
+    As a person would, this lets go of the controls for as long as the robot names a fault: a robot that cannot be seen
+    or does not listen yet moves only when they were let go since.
+
     Raises:
         TimeoutError: none moves; with what the robot says of itself.
     """
@@ -24,10 +27,14 @@ async def drive_until_moved(link: str) -> int:
         await console.take_seat()
         axes = console.description.axes
         speed = axis_values(axes, {0: SHARE * axes[0].maximum})
-        first = last = await drive_on(console, axis_values(axes, {}))
+        rest = axis_values(axes, {})
+        first = last = await drive_on(console, rest)
         end = asyncio.get_running_loop().time() + LONGEST
         while max(abs(now - then) for now, then in zip(last.joints, first.joints, strict=True)) < MOVED:
-            last = await drive_on(console, speed)
+            if last.faults or last.unknown:
+                first = last = await drive_on(console, rest)
+            else:
+                last = await drive_on(console, speed)
             if asyncio.get_running_loop().time() > end:
                 raise TimeoutError(f"nothing moved in {LONGEST:g} s: {last}, {console.stats()}")
         await console.rest()

@@ -90,8 +90,10 @@ async def drive_template(folder: Path, say: Say) -> dict[str, float]:
 
 
 @asynccontextmanager
-async def driven_template(folder: Path, say: Say) -> AsyncIterator[Driven]:
+async def driven_template(folder: Path, say: Say, *, robot: str = "my_arm:MyArm") -> AsyncIterator[Driven]:
     """Write a robot from the template, start it and drive it; end its console on leaving.
+
+    `robot`: the class that is started.
 
     Raises:
         ProcessFailed: a command failed.
@@ -99,7 +101,7 @@ async def driven_template(folder: Path, say: Say) -> AsyncIterator[Driven]:
     terminal = _Terminal(folder, say)
     await terminal.type(LOCKSTEP, "robot", "new", "my_arm")
     terminal.note("written")
-    up = (LOCKSTEP, "up", "--robot", "my_arm:MyArm", *_own(folder))
+    up = (LOCKSTEP, "up", "--robot", robot, *_own(folder))
     async with terminal.running(*up, folder=folder / "my_arm") as console:
         yield await terminal.drive(console)
 
