@@ -59,3 +59,18 @@ async def test_a_wait_that_is_cancelled_leaves_the_alarm_usable() -> None:
     await asyncio.wait([waits])
     alarm.ring()
     await ended_by_ring(alarm)
+
+
+async def test_a_pause_ends_with_its_time_or_with_a_ring_which_ends_the_next_wait_too() -> None:
+    alarm = TickAlarm()
+    assert await alarm.pause(TURN)
+    waits = asyncio.ensure_future(alarm.wait(LONG, at_least=0.0))
+    await asyncio.sleep(0)
+    assert not waits.done(), "the end of a pause is no ring"
+    waits.cancel()
+    await asyncio.wait([waits])
+    asyncio.get_running_loop().call_soon(alarm.ring)
+    async with asyncio.timeout(LONG / 10):
+        assert not await alarm.pause(LONG)
+        assert not await alarm.pause(LONG)
+    await ended_by_ring(alarm)

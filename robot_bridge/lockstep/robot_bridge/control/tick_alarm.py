@@ -15,8 +15,7 @@ class TickAlarm:
     def ring(self) -> None:
         """End the wait now, or the next one as soon as it may end. Rings before that count as one."""
         self._rung = True
-        if self._waiting is not None and not self._waiting.done():
-            self._waiting.set_result(None)
+        self._end_wait()
 
     async def wait(self, seconds: float, *, at_least: float) -> None:
         """Wait for `seconds`, or until the alarm rings, but at least `at_least` seconds."""
@@ -30,12 +29,22 @@ class TickAlarm:
             await self._until_rung(left)
         self._rung = False
 
+    async def pause(self, seconds: float) -> bool:
+        """Wait for `seconds`, or until the alarm rings. Return False if it has; the next wait ends then, too."""
+        if not self._rung:
+            await self._until_rung(seconds)
+        return not self._rung
+
     async def _until_rung(self, seconds: float) -> None:
         loop = asyncio.get_running_loop()
         self._waiting = loop.create_future()
-        timer = loop.call_later(seconds, self.ring)
+        timer = loop.call_later(seconds, self._end_wait)
         try:
             await self._waiting
         finally:
             timer.cancel()
             self._waiting = None
+
+    def _end_wait(self) -> None:
+        if self._waiting is not None and not self._waiting.done():
+            self._waiting.set_result(None)

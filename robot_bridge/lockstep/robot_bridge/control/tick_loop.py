@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import logging
 import time
+from collections.abc import Iterator
 
 from lockstep.robot_bridge.control.clock import Clock
 from lockstep.robot_bridge.control.coming_to_rest import ComingToRest
@@ -27,6 +28,9 @@ from lockstep.robot_bridge.watchdog.watchdogs import Watchdogs
 
 __all__ = ["TickLoop"]
 
+# s from a feedback until the next tick is prepared. The command that answers the feedback takes longer to come, and
+# whoever is to read the feedback may have to share the processors.
+GIVE_WAY = 0.001
 REST_MARGIN = 0.5  # s on top of hold for the robot to come to rest when the bridge closes
 MAX_CATCH_UP = 3  # ticks made good after the loop was blocked; the rest are skipped
 
@@ -104,8 +108,8 @@ class TickLoop:
         leaving.at_once()
         leaving.stop()
 
-    def tick(self) -> None:
-        """Run one tick, and send a feedback if one is due."""
+    def tick(self) -> bool:
+        """Run one tick, and send a feedback if one is due. Return whether one was."""
         now = self._now()
         feedback = self._executor.tick(now)
         if self._shaper.at_rest:
@@ -114,18 +118,25 @@ class TickLoop:
             self._publisher.publish_feedback(feedback)
         if (status := self._executor.status(now)) is not None:
             self._publisher.publish_to_operator(status)
-        self._robot.prepare()
+        return feedback is not None
 
     async def _tick_on(self) -> None:
         metronome = Ticker(self._robot.tick_seconds, time.monotonic(), catch_up=MAX_CATCH_UP)
         while True:
             await self._wait(metronome)
             self._counters.skipped_ticks = metronome.skipped
-            try:
-                self.tick()
+            with _calls_of_the_robot():
+                is_fed_back = self.tick()
                 self._liveness.ticked()
-            except BaseException as error:  # an adapter may raise one that ends the loop or cancels the task
-                raise RobotFailed(named(error)) from error
+            if await self._has_time(is_fed_back):
+                with _calls_of_the_robot():
+                    self._executor.prepare()
+
+    async def _has_time(self, is_fed_back: bool) -> bool:
+        """Give way to whoever reads the feedback that was sent; return whether there is time to prepare a tick."""
+        if is_fed_back and self._robot.ticks_on_command:
+            return await self._alarm.pause(min(GIVE_WAY, self._robot.tick_seconds / 4))
+        return True
 
     async def _wait(self, metronome: Ticker) -> None:
         """Wait for the next tick."""
@@ -163,3 +174,16 @@ class TickLoop:
 
     def _coming_to_rest(self) -> ComingToRest:
         return ComingToRest(self._robot, self._shaper, self._hold, self._now())
+
+
+@contextlib.contextmanager
+def _calls_of_the_robot() -> Iterator[None]:
+    """Nothing is awaited within: an adapter may raise what ends the loop or cancels the task, and that is its failure.
+
+    Raises:
+        RobotFailed: anything was raised.
+    """
+    try:
+        yield
+    except BaseException as error:
+        raise RobotFailed(named(error)) from error

@@ -13,6 +13,7 @@ from lockstep.robot_bridge.kinematics.rotations import from_quaternion
 __all__ = ["Chain", "ChainPoint", "ChainState", "NoChain", "cross"]
 
 Array = npt.NDArray[np.float64]
+PARALLEL = 1e-9  # of 1 - cosine
 
 
 class NoChain(ValueError):
@@ -122,6 +123,25 @@ class Chain:
             linear = np.where(self._slides[:, None], axes, linear)
             angular = np.where(self._slides[:, None], 0.0, axes)
         return ChainState(position, tool[:3, :3], linear.T, angular.T, places, turns, axes)
+
+    def levers(self, near: int, far: int, extent: float) -> Array:
+        """Return how fast the distance of two bodies changes at most when each joint does, m per rad.
+
+        `near`, `far`: the number of joints that move each, the smaller first; the base is moved by none. `extent`: m,
+        how far points of the second are from the origin of the frame that its last joint moves. Infinite where a slide
+        is between them: its length bounds nothing.
+        """
+        levers = np.zeros(len(self._links))
+        for joint in range(near, far):
+            between = self._links[joint + 1 : far]
+            slides = self._links[joint].slides or any(link.slides for link in between)
+            levers[joint] = math.inf if slides else sum(math.hypot(*link.offset) for link in between) + extent
+        return levers
+
+    def turns_about(self, direction: Array) -> bool:
+        """Return whether the first joint turns about this unit vector, in the base's frame, or against it."""
+        first = self._links[0]
+        return not first.slides and abs(float(first.turn @ first.axis @ direction)) > 1.0 - PARALLEL
 
     def place(self, state: ChainState, point: ChainPoint) -> Array:
         """Return where a point is, m."""

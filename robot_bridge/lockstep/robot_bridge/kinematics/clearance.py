@@ -31,7 +31,17 @@ class Gap(NamedTuple):
 
 
 class GapSource(Protocol):
-    """Knows what the robot must keep off."""
+    """Knows what the robot must keep off.
+
+    Attributes:
+        levers: m per rad, how fast each distance changes at most when each joint does, distances x joints
+    """
+
+    @property
+    def levers(self) -> Array: ...
+
+    def widths(self, state: ChainState, within: float) -> Array:
+        """Return each distance (m) that `levers` is about; one that is not below `within` (m) counts as `within`."""
 
     def gaps(self, state: ChainState, within: float, ahead: Array | None = None) -> list[Gap]:
         """Return the gaps that are narrower than `within` (m).
@@ -41,7 +51,11 @@ class GapSource(Protocol):
 
 
 class Clearance:
-    """Computes the gaps between pairs of bodies of a chain. The capsules should hold the bodies' parts entirely."""
+    """Computes the gaps between pairs of bodies of a chain. The capsules should hold the bodies' parts entirely.
+
+    Attributes:
+        levers: of each pair, see `GapSource`
+    """
 
     def __init__(self, chain: Chain, capsules: Mapping[str, Capsule], pairs: Sequence[tuple[str, str]]) -> None:
         """`capsules`: by body. `pairs`: of bodies that must not touch.
@@ -63,21 +77,47 @@ class Clearance:
         self._columns = np.array([pair[:2] for pair in self._pairs], dtype=int).reshape(-1, 2).T
         reaches = np.array([math.dist(each.start, each.end) / 2 + each.radius for each in capsules.values()])
         self._reaches = reaches[self._columns].sum(axis=0)  # m, of both capsules around their middles
+        self.levers = np.array([self._levers(capsules, *pair) for pair in pairs]).reshape(-1, len(chain.joints))
 
     def gaps(self, state: ChainState, within: float, ahead: Array | None = None) -> list[Gap]:
         """Return the gaps of the pairs that are closer than `within` (m), or come so by the motion `ahead`."""
         if not self._pairs:
             return []
+        ends = self._ends_at(state)
+        closer = within if ahead is None else within + self._comes_closer(state, ends, ahead)
+        gaps = (self._gap(state, self._pairs[number], ends, within, ahead) for number in self._near(ends, closer))
+        return [gap for gap in gaps if gap is not None]
+
+    def widths(self, state: ChainState, within: float) -> Array:
+        """Return the distance of each pair, m; one that is not below `within` (m) counts as `within`."""
+        widths = np.full(len(self._pairs), within)
+        if self._pairs:
+            ends = self._ends_at(state)
+            for number in self._near(ends, within):
+                first, second, radii = self._pairs[number]
+                here, there = _nearest(ends[first], ends[second])
+                widths[number] = min(within, math.dist(here, there) - radii)
+        return widths
+
+    def _levers(self, capsules: Mapping[str, Capsule], one: str, other: str) -> Array:
+        names = list(capsules)
+        near, far = sorted((one, other), key=lambda name: self._ends[names.index(name)][0].moving)
+        ends = self._ends[names.index(far)]
+        extent = max(math.hypot(*end.position) for end in ends) + capsules[far].radius
+        return self._chain.levers(self._ends[names.index(near)][0].moving, ends[0].moving, extent)
+
+    def _ends_at(self, state: ChainState) -> Array:
+        """Return where the capsules' ends are, m, capsules x 2 x 3."""
         places = state.places[self._both] + (state.turns[self._both] @ self._places)[:, :, 0]
-        ends = places.reshape(-1, 2, 3)
+        ends: Array = places.reshape(-1, 2, 3)
+        return ends
+
+    def _near(self, ends: Array, within: Array | float) -> list[int]:
+        """Return the pairs whose capsules may be nearer than `within` (m, also one for each)."""
         middles = ends.mean(axis=1)
         apart = middles[self._columns[0]] - middles[self._columns[1]]
-        closer = self._reaches + within
-        if ahead is not None:
-            closer = closer + self._comes_closer(state, ends, ahead)
-        near = np.flatnonzero((apart * apart).sum(axis=1) < closer**2)
-        gaps = (self._gap(state, self._pairs[number], ends, within, ahead) for number in near.tolist())
-        return [gap for gap in gaps if gap is not None]
+        near: list[int] = np.flatnonzero((apart * apart).sum(axis=1) < (self._reaches + within) ** 2).tolist()
+        return near
 
     def _comes_closer(self, state: ChainState, ends: Array, ahead: Array) -> Array:
         """Return by how much two places of each pair come closer to each other at most, m."""
@@ -90,9 +130,7 @@ class Clearance:
         self, state: ChainState, pair: tuple[int, int, float], ends: Array, within: float, ahead: Array | None
     ) -> Gap | None:
         first, second, radii = pair
-        (a, b), (c, d) = ends[first], ends[second]
-        s, t = nearest_places(a, b, c, d)
-        here, there = a + s * (b - a), c + t * (d - c)
+        here, there = _nearest(ends[first], ends[second])
         apart = here - there
         length = math.sqrt(apart @ apart)
         is_near = length < radii + within
@@ -106,6 +144,13 @@ class Clearance:
 
     def _motion(self, state: ChainState, ends: tuple[ChainPoint, ChainPoint], place: Array) -> Array:
         return self._chain.motion(state, ends[0].moving, place)
+
+
+def _nearest(one: Array, other: Array) -> tuple[Array, Array]:
+    """Return where two lines, given by their ends (2 x 3, m), are nearest to each other."""
+    (a, b), (c, d) = one, other
+    s, t = nearest_places(a, b, c, d)
+    return a + s * (b - a), c + t * (d - c)
 
 
 def nearest_places(a: Array, b: Array, c: Array, d: Array) -> tuple[float, float]:

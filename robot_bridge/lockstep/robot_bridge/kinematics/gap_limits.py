@@ -82,12 +82,14 @@ def gap_limits(gaps: Sequence[Gap], joints: int, gain: float, close: float) -> G
     A gap becomes narrower by at most `gain` (1/s) times what it is wider than `close` (m). Gaps that no joint changes
     are left out.
     """
+    if not gaps:
+        return GapLimits(np.zeros((0, joints)), np.zeros(0), np.zeros(0), ())
     ordered = sorted(gaps, key=lambda gap: -gap.distance)
     gradients = np.array([gap.gradient for gap in ordered]).reshape(-1, joints)
     steep = np.sqrt((gradients * gradients).sum(axis=1))
     most = gain * (np.array([gap.distance for gap in ordered]) - close)
     what = tuple(gap.what for gap in ordered)
-    if len(ordered) and steep.min() <= FLAT:
+    if steep.min() <= FLAT:
         changes = steep > FLAT
         gradients, steep, most = gradients[changes], steep[changes], most[changes]
         what = tuple(name for name, kept in zip(what, changes.tolist(), strict=True) if kept)

@@ -55,7 +55,11 @@ def plane(name: str, point: Sequence[float], normal: Sequence[float]) -> Obstacl
 
 
 class Obstacles:
-    """Computes the gap between each body and each obstacle that is near it."""
+    """Computes the gap between each body and each obstacle that is near it, if the joints change it.
+
+    Attributes:
+        levers: of each body and obstacle, the obstacles of a body after each other, see `GapSource`
+    """
 
     def __init__(self, chain: Chain, surfaces: Mapping[str, Surface], obstacles: Sequence[Obstacle]) -> None:
         """`surfaces`: by body.
@@ -75,6 +79,10 @@ class Obstacles:
                 middles.append(middle)
                 reaches.append(float((np.linalg.norm(points - middle, axis=1) + surface.radii).max()))
         self._obstacles = tuple(obstacles)
+        self.levers = np.array(
+            [self._levers(body, each) for body in self._bodies for each in self._obstacles], dtype=np.float64
+        ).reshape(-1, len(chain.joints))
+        self._changes = self.levers.any(axis=1).reshape(len(self._bodies), len(self._obstacles))
         self._moving = np.array([moving for moving, _, _ in self._bodies], dtype=int)
         self._middles = np.array(middles).reshape(-1, 3, 1)
         self._reaches = np.array(reaches)
@@ -94,18 +102,38 @@ class Obstacles:
         twists = None if ahead is None else self._chain.twists(state, ahead)
         found: list[Gap] = []
         for body, obstacles in self._near(state, within, twists):
-            for obstacle in obstacles:
-                found += self._between(state, body, obstacle, within, twists)
+            for number in obstacles:
+                found += self._between(state, body, self._obstacles[number], within, twists)
         return found
+
+    def widths(self, state: ChainState, within: float) -> Array:
+        """Return each distance of a body from an obstacle, m; one that is not below `within` (m) counts as `within`.
+
+        So do those that no joint changes.
+        """
+        widths = np.full((len(self._bodies), len(self._obstacles)), within)
+        if widths.size:
+            for body, obstacles in self._near(state, within, None):
+                radii = self._bodies[body][2]
+                for number in obstacles:
+                    obstacle = self._obstacles[number]
+                    beyond = np.abs(self._along(obstacle, state, body)) - obstacle.half[:, None]
+                    widths[body, number] = min(within, float((_distances(beyond) - radii).min()))
+        return widths.reshape(-1)
+
+    def _levers(self, body: tuple[int, Array, Array], obstacle: Obstacle) -> Array:
+        moving, points, radii = body
+        levers = self._chain.levers(0, moving, float((np.linalg.norm(points, axis=0) + radii).max()))
+        if np.isinf(obstacle.half[:2]).all() and self._chain.turns_about(obstacle.rotation[:, 2]):
+            levers[0] = 0.0  # the first joint turns the arm over a floor
+        return levers
 
     def _between(
         self, state: ChainState, body: int, obstacle: Obstacle, within: float, twists: tuple[Array, Array] | None
     ) -> Iterator[Gap]:
         """Yield the gaps between a body and an obstacle. Places and ways are along the obstacle's sides, 3 x n."""
-        moving, points, radii = self._bodies[body]
-        sides = obstacle.rotation.T
-        begins = sides @ (state.places[moving] - obstacle.position)
-        places = sides @ state.turns[moving] @ points + begins[:, None]
+        moving, _, radii = self._bodies[body]
+        sides, places = obstacle.rotation.T, self._along(obstacle, state, body)
         beyond = np.abs(places) - obstacle.half[:, None]
         distances = soon = _distances(beyond) - radii
         outward = None
@@ -122,12 +150,20 @@ class Obstacles:
             motion = self._chain.motion(state, moving, place)
             yield Gap(float(distances[number]), (obstacle.rotation @ out) @ motion, obstacle.name)
 
+    def _along(self, obstacle: Obstacle, state: ChainState, body: int) -> Array:
+        """Return the places of a body's surface from the obstacle's middle, along its sides, m, 3 x n."""
+        moving, points, _ = self._bodies[body]
+        begins = obstacle.rotation.T @ (state.places[moving] - obstacle.position)
+        places: Array = obstacle.rotation.T @ state.turns[moving] @ points + begins[:, None]
+        return places
+
     def _near(
         self, state: ChainState, within: float, twists: tuple[Array, Array] | None
-    ) -> Iterator[tuple[int, list[Obstacle]]]:
-        """Yield each body whose ball is near obstacles, and these. One computation for all: most are far, every tick.
+    ) -> Iterator[tuple[int, list[int]]]:
+        """Yield each body whose ball is near obstacles that joints bring nearer, and the numbers of these.
 
-        The distance of a ball's middle is taken along the sides alone, which is never more than it is.
+        One computation for all: most are far, every tick. The distance of a ball's middle is taken along the sides
+        alone, which is never more than it is.
         """
         middles = state.places[self._moving] + (state.turns[self._moving] @ self._middles)[:, :, 0]
         reaches = self._reaches + within
@@ -139,9 +175,9 @@ class Obstacles:
             )
         beyond = np.abs(middles @ self._sides.T - self._offsets) - self._halves  # bodies x (obstacles, 3)
         beyond = beyond.reshape(len(middles), -1, 3).max(axis=2)
-        near = beyond < reaches[:, None]
+        near = (beyond < reaches[:, None]) & self._changes
         for body in np.flatnonzero(near.any(axis=1)).tolist():
-            yield body, [self._obstacles[number] for number in np.flatnonzero(near[body]).tolist()]
+            yield body, np.flatnonzero(near[body]).tolist()
 
 
 def _spread(places: Array, distances: Array, within: float, apart: float) -> Iterator[int]:

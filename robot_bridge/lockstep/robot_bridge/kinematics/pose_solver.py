@@ -20,6 +20,7 @@ import numpy.typing as npt
 from lockstep.robot_bridge.kinematics.chain import Chain, ChainState
 from lockstep.robot_bridge.kinematics.clearance import GapSource
 from lockstep.robot_bridge.kinematics.gap_limits import GapLimits, gap_limits
+from lockstep.robot_bridge.kinematics.near_gaps import NearGaps
 from lockstep.robot_bridge.kinematics.rotations import rotation_vector
 from lockstep.robot_bridge.kinematics.task_order import Damping, TaskOrder, task_order
 
@@ -85,7 +86,7 @@ class Prepared(NamedTuple):
 
 
 class PoseSolver:
-    """Steps from joint goals to joint goals. It remembers nothing: the caller keeps the goals."""
+    """Steps from joint goals to joint goals. What it remembers changes no result: the caller keeps the goals."""
 
     def __init__(
         self,
@@ -104,7 +105,7 @@ class PoseSolver:
         self._ramp = bounds.ramp
         self._accelerations = self._rates / bounds.ramp
         self._posture = None if posture is None else np.array(posture)
-        self._keeps_off = tuple(keeps_off)
+        self._keeps_off = NearGaps(keeps_off)
         self._turns = turns
         self._tuning = tuning or Tuning()
 
@@ -113,7 +114,7 @@ class PoseSolver:
         here = np.array(joints)
         state = self._chain.at(joints)
         slowest, fastest = self._speeds(here)
-        gaps = self._near(state, before)
+        gaps = self._near(here, state, before)
         order = self._order(state, np.ones(len(here), dtype=bool), gaps, [])
         kept = None if before is None else tuple(before)
         return Prepared(tuple(joints), kept, here, state, slowest, fastest, gaps, order)
@@ -186,14 +187,14 @@ class PoseSolver:
         fastest = np.clip(gain * (self._upper - here), 0.0, self._rates)
         return slowest, fastest
 
-    def _near(self, state: ChainState, before: Sequence[float] | None) -> GapLimits:
+    def _near(self, here: Array, state: ChainState, before: Sequence[float] | None) -> GapLimits:
         """Return what is near, the nearest last.
 
         What comes fast is near from further away: joints need time to become slower.
         """
         tuning = self._tuning
         ahead = None if before is None or not any(before) else np.array(before) / tuning.limit_gain
-        found = [gap for source in self._keeps_off for gap in source.gaps(state, tuning.safe, ahead)]
+        found = self._keeps_off.gaps(here, state, tuning.safe, ahead)
         return gap_limits(found, len(self._rates), tuning.limit_gain, tuning.close)
 
     def _within(

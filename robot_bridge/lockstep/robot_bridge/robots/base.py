@@ -118,8 +118,8 @@ class Robot(ABC):
     def prepare(self) -> None:
         """Compute what the next `apply` and `tick` can use, whatever their values are, so that they take less time.
 
-        Called after each tick while the bridge runs, when its feedback was sent. It must change nothing that the robot
-        does.
+        Called after each tick while the bridge runs. A robot that `ticks_on_command` gets it 1 ms after a feedback was
+        sent, and not at all when a command comes before. It must change nothing that the robot does.
         """
 
     @abstractmethod
@@ -129,8 +129,8 @@ class Robot(ABC):
     def measured_axes(self) -> Sequence[float]:
         """Return the measured value of each axis now, as in `measure`; NaN if unknown or too old to be trusted.
 
-        Called when the bridge starts, when a stop was reset, and for commands with goals, once between two ticks at
-        most: `reach` bounds their distance from here. So it should cost little. Needed only for goal axes.
+        Called when the bridge starts, when a stop was reset, and while commands with goals come, once between two ticks
+        at most: `reach` bounds their distance from here. So it should cost little. Needed only for goal axes.
         """
         return self.measure().axes
 

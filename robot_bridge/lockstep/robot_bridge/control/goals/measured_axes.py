@@ -7,12 +7,15 @@ from lockstep.robot_bridge.robots.base import Robot
 
 __all__ = ["MeasuredAxes"]
 
+LATELY = 1.0  # s since a command asked, for which the next one's answer is measured ahead
+
 
 class MeasuredAxes:
     """Returns the measured value of each axis when it is called; NaN for all if the adapter raised.
 
-    Call `look` in every tick. It asks the adapter once between two ticks at most: a link may send thousands of commands
-    a second whose goals are refused, and a slow adapter that was asked for each would hold up the ticks.
+    Call `look` in every tick, and `measure_ahead` when there is time after one. It asks the adapter once between two
+    ticks at most: a link may send thousands of commands a second whose goals are refused, and a slow adapter that was
+    asked for each would hold up the ticks.
     """
 
     def __init__(self, robot: Robot, axes: int) -> None:
@@ -20,11 +23,19 @@ class MeasuredAxes:
         self._axes = axes
         self._error: BaseException | None = None
         self._places: Sequence[float] | None = None  # measured since the last tick
+        self._lately = int(LATELY / robot.tick_seconds)  # ticks
+        self._unasked = self._lately + 1  # ticks since a command asked
 
     def __call__(self) -> Sequence[float]:
+        self._unasked = 0
         if self._places is None:
             self._places = self._measure()
         return self._places
+
+    def measure_ahead(self) -> None:
+        """Ask the adapter now, if commands have asked lately: the next one that does is then answered at once."""
+        if self._places is None and self._unasked <= self._lately:
+            self._places = self._measure()
 
     def _measure(self) -> Sequence[float]:
         try:
@@ -43,5 +54,6 @@ class MeasuredAxes:
             BaseException: the adapter's.
         """
         self._places = None
+        self._unasked += 1
         if self._error is not None:
             raise self._error

@@ -80,7 +80,7 @@ class Drive(ABC):
         """Return the faults that keep this part from being driven, in words for a person."""
         found = self.sensor_faults(now) + self.topic.faults()
         if self._stream.withheld and not self._stopped and not found:
-            found.append(f"{self._name}: let go of the controls once; the robot was not seen or heard while they were held")
+            found.append(f"{self._name}: let go of the controls once; the robot was not reached while they were held")
         return found
 
     @abstractmethod
