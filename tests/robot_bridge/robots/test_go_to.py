@@ -44,6 +44,14 @@ def test_axes_without_a_goal_stay_or_rest() -> None:
     assert (step.values, step.done, step.progress) == ([0.0, None, 0.05], False, 0.0)
 
 
+def test_it_says_that_it_is_there_only_when_it_is() -> None:
+    measured = [0.0]
+    run = go_to({0: 1.0}, [JOINT], measured)
+    assert run.step().text == "on its way"
+    measured[0] = 1.0
+    assert run.step().text == "there"
+
+
 @pytest.mark.parametrize(
     ("axis", "goal", "place", "is_there"),
     [

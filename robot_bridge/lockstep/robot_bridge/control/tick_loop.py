@@ -30,7 +30,7 @@ __all__ = ["TickLoop"]
 
 # s from a feedback until the next tick is prepared. The command that answers the feedback takes longer to come, and
 # whoever is to read the feedback may have to share the processors.
-GIVE_WAY = 0.001
+GIVE_WAY = 0.002
 REST_MARGIN = 0.5  # s on top of hold for the robot to come to rest when the bridge closes
 MAX_CATCH_UP = 3  # ticks made good after the loop was blocked; the rest are skipped
 
@@ -135,7 +135,7 @@ class TickLoop:
     async def _has_time(self, is_fed_back: bool) -> bool:
         """Give way to whoever reads the feedback that was sent; return whether there is time to prepare a tick."""
         if is_fed_back and self._robot.ticks_on_command:
-            return await self._alarm.pause(min(GIVE_WAY, self._robot.tick_seconds / 4))
+            return await self._alarm.pause(min(GIVE_WAY, self._robot.tick_seconds / 2))
         return True
 
     async def _wait(self, metronome: Ticker) -> None:

@@ -118,7 +118,7 @@ class Robot(ABC):
     def prepare(self) -> None:
         """Compute what the next `apply` and `tick` can use, whatever their values are, so that they take less time.
 
-        Called after each tick while the bridge runs. A robot that `ticks_on_command` gets it 1 ms after a feedback was
+        Called after each tick while the bridge runs. A robot that `ticks_on_command` gets it 2 ms after a feedback was
         sent, and not at all when a command comes before. It must change nothing that the robot does.
         """
 

@@ -12,6 +12,7 @@ __all__ = ["GoTo"]
 NEAR: Final = 0.03  # rad, of every joint
 NEAR_SHARE: Final = 0.02  # of an axis' range, where that is nearer, and of every slide's
 NEARER: Final = 1 / 3  # of NEAR, of all joints together, that counts as nearer
+GOING: Final = "on its way"
 PATIENCE: Final = 2.0  # s without getting nearer
 
 
@@ -32,8 +33,8 @@ class GoTo(ActionRun):
     ) -> None:
         """`goals`: rad or m, by number of axis. `axes`: all of the robot. `tick`: s between two steps.
 
-        `measured`: the places of the axes, at least up to the last one that has a goal. `text`: what is said while it
-        goes, and when it is there. `blocked`: what is said when it does not get there.
+        `measured`: the places of the axes, at least up to the last one that has a goal. `text`: what is said when it is
+        there. `blocked`: what is said when it does not get there.
         """
         self._goals = {number: (goal, axes[number], _near(axes[number])) for number, goal in goals.items()}
         self._rest = [None if axis.kind == "goal" else axis.rest for axis in axes]
@@ -61,7 +62,7 @@ class GoTo(ActionRun):
             if others and max(others) < 1.0:
                 return ActionStep(progress=1.0, text=self._text, done=True)
             raise ActionFailed(self._blocked)
-        return ActionStep(progress=max(0.0, 1 - total / self._whole), text=self._text, values=self._values())
+        return ActionStep(progress=max(0.0, 1 - total / self._whole), text=GOING, values=self._values())
 
     def cancel(self) -> None:
         """The bridge brings the goals to rest."""
