@@ -26,8 +26,8 @@ from lockstep.protocol.messages import (
     decode_message,
     encode_message,
 )
+from lockstep.robot_bridge.link.admission.link_acceptor import RATE
 from lockstep.robot_bridge.link.heartbeats import PING_INTERVAL, SILENCE
-from lockstep.robot_bridge.link.link_acceptor import RATE
 from lockstep.robot_bridge.link.link_server import OPERATOR_READ_RATE, READ_BURST, READ_RATE
 from lockstep.robot_bridge.link.link_session import (
     FROM_CLIENT,

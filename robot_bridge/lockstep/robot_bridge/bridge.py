@@ -129,7 +129,7 @@ class Bridge:
         )
         self._dialer = None if settings.console is None else _dialer(settings.console, self._links)
         self._ticks = TickLoop(
-            *(robot, description.hold, shaper, executor, self._stops),
+            *(robot, description.hold, shaper, executor, measured, self._stops),
             *(self._watchdogs, self._liveness, self._links.publisher, alarm, counters),
             now,
         )

@@ -33,8 +33,8 @@ from lockstep.protocol.messages import (
 )
 from lockstep.protocol.serial import event_after, event_gap
 from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.link.admission.link_acceptor import LinkAcceptor
 from lockstep.robot_bridge.link.heartbeats import SILENCE
-from lockstep.robot_bridge.link.link_acceptor import LinkAcceptor
 from lockstep.robot_bridge.link.link_server import LinkPeer
 from lockstep.robot_bridge.link.link_session import HELLO_TIMEOUT, ClientSession
 from lockstep.robot_bridge.link.link_transport import TICK_INTERVAL

@@ -15,7 +15,7 @@ from lockstep.protocol.link_secret import LinkSecret
 from lockstep.protocol.messages import Feedback, Goodbye, Hello, Media, Ping, Stop, encode_message
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.errors import InsecureLink
-from lockstep.robot_bridge.link import link_acceptor
+from lockstep.robot_bridge.link.admission import link_acceptor
 from lockstep.robot_bridge.link.check_link import check_link
 from lockstep.robot_bridge.link.link_client import RobotLink
 from lockstep.robot_bridge.link.link_tls import LinkTls

@@ -143,15 +143,6 @@ class CommandExecutor:
 
     # The tick
 
-    def prepare(self) -> None:
-        """Do what the next command and the next tick can use; called after a tick, when there is time.
-
-        Raises:
-            BaseException: the adapter's.
-        """
-        self._robot.prepare()
-        self._measured.measure_ahead()
-
     def tick(self, now: float) -> Feedback | None:
         """Move the robot for one tick. Return a feedback if one is due.
 

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from lockstep.robot_bridge.control.clock import Clock
 from lockstep.robot_bridge.control.coming_to_rest import ComingToRest
 from lockstep.robot_bridge.control.command_executor import CommandExecutor
+from lockstep.robot_bridge.control.goals.measured_axes import MeasuredAxes
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.tick_alarm import TickAlarm
 from lockstep.robot_bridge.control.ticker import Ticker
@@ -46,6 +47,7 @@ class TickLoop:
         hold: float,
         shaper: AxisShaper,
         executor: CommandExecutor,
+        measured: MeasuredAxes,
         stops: StopHandler,
         watchdogs: Watchdogs,
         liveness: Liveness,
@@ -59,6 +61,7 @@ class TickLoop:
         self._hold = hold
         self._shaper = shaper
         self._executor = executor
+        self._measured = measured
         self._stops = stops
         self._watchdogs = watchdogs
         self._liveness = liveness
@@ -130,7 +133,8 @@ class TickLoop:
                 self._liveness.ticked()
             if await self._has_time(is_fed_back):
                 with _calls_of_the_robot():
-                    self._executor.prepare()
+                    self._robot.prepare()
+                    self._measured.measure_ahead()
 
     async def _has_time(self, is_fed_back: bool) -> bool:
         """Give way to whoever reads the feedback that was sent; return whether there is time to prepare a tick."""

@@ -23,10 +23,10 @@ from lockstep.protocol.messages import (
 )
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.errors import ListenError
-from lockstep.robot_bridge.link.applicants import Strangers
-from lockstep.robot_bridge.link.known_addresses import KnownAddresses
-from lockstep.robot_bridge.link.link_acceptor import LinkAcceptor, listening_socket
-from lockstep.robot_bridge.link.link_admission import LinkAdmission
+from lockstep.robot_bridge.link.admission.applicants import Strangers
+from lockstep.robot_bridge.link.admission.known_addresses import KnownAddresses
+from lockstep.robot_bridge.link.admission.link_acceptor import LinkAcceptor, listening_socket
+from lockstep.robot_bridge.link.admission.link_admission import LinkAdmission
 from lockstep.robot_bridge.link.link_session import BadInput, BridgeSession
 from lockstep.robot_bridge.link.link_transport import TICK_INTERVAL, LinkTransport
 from lockstep.robot_bridge.link.message_rate import MessageRate

@@ -98,8 +98,8 @@ async def test_a_console_gets_its_link_every_time(tls: bool, host: str, says: by
 async def test_a_console_that_was_admitted_comes_back_while_strangers_take_all_handshakes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lockstep.robot_bridge.link.link_acceptor.HANDSHAKE_RATE", 0.001)
-    monkeypatch.setattr("lockstep.robot_bridge.link.link_acceptor.HANDSHAKE_BURST", 1)
+    monkeypatch.setattr("lockstep.robot_bridge.link.admission.link_acceptor.HANDSHAKE_RATE", 0.001)
+    monkeypatch.setattr("lockstep.robot_bridge.link.admission.link_acceptor.HANDSHAKE_BURST", 1)
     authority = Authority(tmp_path)
     trust = LinkTls(authority=authority.certificate).client_context()
     settings = BridgeSettings(port=0, secret=SECRET, tls=LinkTls(certificate=authority.issue("bridge")))
@@ -110,8 +110,8 @@ async def test_a_console_that_was_admitted_comes_back_while_strangers_take_all_h
 
 
 async def test_it_comes_back_to_the_next_bridge_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lockstep.robot_bridge.link.link_acceptor.HANDSHAKE_RATE", 0.001)
-    monkeypatch.setattr("lockstep.robot_bridge.link.link_acceptor.HANDSHAKE_BURST", 1)
+    monkeypatch.setattr("lockstep.robot_bridge.link.admission.link_acceptor.HANDSHAKE_RATE", 0.001)
+    monkeypatch.setattr("lockstep.robot_bridge.link.admission.link_acceptor.HANDSHAKE_BURST", 1)
     authority = Authority(tmp_path)
     trust = LinkTls(authority=authority.certificate).client_context()
     tls = LinkTls(certificate=authority.issue("bridge"))

@@ -6,7 +6,7 @@ from lockstep.protocol.actions import Status
 from lockstep.protocol.framing import FrameReader
 from lockstep.protocol.maps import OccupancyMap
 from lockstep.protocol.messages import Hello, LinkMessage, LinkRole, Media, decode_message
-from lockstep.robot_bridge.link.link_admission import LinkAdmission
+from lockstep.robot_bridge.link.admission.link_admission import LinkAdmission
 from lockstep.robot_bridge.link.link_session import BridgeSession, kind_of
 from lockstep.robot_bridge.link.link_transport import LinkTransport
 from lockstep.robot_bridge.link.sending.link_publisher import LinkPublisher

@@ -12,7 +12,7 @@ from lockstep.protocol.framing import frame
 from lockstep.protocol.maps import Navigation, OccupancyMap
 from lockstep.protocol.messages import EventNotice, Feedback, LinkMessage, Media, encode_message
 from lockstep.protocol.traces.trace import PictureSpans, span_ms
-from lockstep.robot_bridge.link.link_admission import LinkAdmission
+from lockstep.robot_bridge.link.admission.link_admission import LinkAdmission
 from lockstep.robot_bridge.link.link_transport import LinkTransport
 
 __all__ = ["LinkPublisher", "StreamEncoding", "encode_once", "encode_waited"]

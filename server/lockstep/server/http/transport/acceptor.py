@@ -6,7 +6,7 @@ import socket
 import ssl
 from collections.abc import Callable
 
-from lockstep.robot_bridge.link.accepting import accepted
+from lockstep.robot_bridge.link.admission.accepting import accepted
 from lockstep.server.http.transport.client_address import counted_address
 from lockstep.server.http.transport.connection_places import ConnectionPlaces, Place
 from lockstep.server.util.fair_queue import FairQueue

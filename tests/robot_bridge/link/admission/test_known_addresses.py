@@ -1,6 +1,6 @@
 from pathlib import Path
 
-from lockstep.robot_bridge.link.known_addresses import LIMIT, KnownAddresses
+from lockstep.robot_bridge.link.admission.known_addresses import LIMIT, KnownAddresses
 
 
 def test_addresses_are_known_by_their_network_and_after_a_restart(tmp_path: Path) -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from lockstep.robot_bridge.link.known_addresses import KnownAddresses
-from lockstep.robot_bridge.link.link_acceptor import LinkAcceptor, listening_socket
+from lockstep.robot_bridge.link.admission.known_addresses import KnownAddresses
+from lockstep.robot_bridge.link.admission.link_acceptor import LinkAcceptor, listening_socket
 from lockstep.robot_bridge.link.link_tls import LinkTls
 from tests.support.certificates import Authority
 from tests.waiting import PATIENCE
@@ -66,8 +66,8 @@ async def tls_acceptor(directory: Path, known: KnownAddresses | None = None) -> 
 @pytest.fixture
 def one_handshake(monkeypatch: pytest.MonkeyPatch) -> None:
     """Strangers begin one, and the next a quarter of an hour later."""
-    monkeypatch.setattr("lockstep.robot_bridge.link.link_acceptor.HANDSHAKE_RATE", 0.001)
-    monkeypatch.setattr("lockstep.robot_bridge.link.link_acceptor.HANDSHAKE_BURST", 1)
+    monkeypatch.setattr("lockstep.robot_bridge.link.admission.link_acceptor.HANDSHAKE_RATE", 0.001)
+    monkeypatch.setattr("lockstep.robot_bridge.link.admission.link_acceptor.HANDSHAKE_BURST", 1)
 
 
 @pytest.mark.usefixtures("one_handshake")
@@ -108,7 +108,7 @@ async def test_an_address_that_is_admitted_while_others_are_written_is_written_t
         assert goes_on.wait(PATIENCE)
         replace(fresh, to)
 
-    monkeypatch.setattr("lockstep.robot_bridge.link.known_addresses.os.replace", slow)
+    monkeypatch.setattr("lockstep.robot_bridge.link.admission.known_addresses.os.replace", slow)
     async with tls_acceptor(tmp_path, KnownAddresses(path)) as tls:
         tls.acceptor.admitted("192.0.2.1")
         await asyncio.to_thread(begun.wait, PATIENCE)

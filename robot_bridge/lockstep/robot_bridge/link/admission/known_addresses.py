@@ -7,7 +7,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-from lockstep.robot_bridge.link.applicants import address_group
+from lockstep.robot_bridge.link.admission.applicants import address_group
 
 __all__ = ["KnownAddresses"]
 

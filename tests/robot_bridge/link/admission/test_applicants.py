@@ -2,7 +2,7 @@
 
 import pytest
 
-from lockstep.robot_bridge.link.applicants import Applicants, Strangers, address_group
+from lockstep.robot_bridge.link.admission.applicants import Applicants, Strangers, address_group
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 """Which links are admitted."""
 
 from lockstep.protocol.messages import Goodbye, Hello, LinkRole
-from lockstep.robot_bridge.link.link_admission import LinkAdmission
+from lockstep.robot_bridge.link.admission.link_admission import LinkAdmission
 
 GRACE = 10.0  # s
 

@@ -8,9 +8,9 @@ import ssl
 from collections.abc import Callable
 from functools import partial
 
-from lockstep.robot_bridge.link.accepting import accepted, readable
-from lockstep.robot_bridge.link.applicants import Applicants
-from lockstep.robot_bridge.link.known_addresses import KnownAddresses
+from lockstep.robot_bridge.link.admission.accepting import accepted, readable
+from lockstep.robot_bridge.link.admission.applicants import Applicants
+from lockstep.robot_bridge.link.admission.known_addresses import KnownAddresses
 
 __all__ = ["LinkAcceptor", "listening_socket"]
 

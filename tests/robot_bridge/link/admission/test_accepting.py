@@ -2,7 +2,7 @@ import asyncio
 import os
 import socket
 
-from lockstep.robot_bridge.link.accepting import accepted
+from lockstep.robot_bridge.link.admission.accepting import accepted
 from tests.waiting import PATIENCE
 
 
