@@ -64,6 +64,7 @@ def test_an_episode_that_finds_the_disk_full_is_appended_when_there_is_room_agai
         assert said[-1].startswith("dataset cannot be written, and is tried again: ")
         assert events_of(root) == [[*range(10, 20)]]
         assert verify_dataset(root).ok
+    assert sum("tried again" in each for each in said) == 1
     ballast.unlink()
     assert following.look([file.path]) == 1
     assert events_of(root) == [[*range(10, 20)], [*range(45, 60)]]

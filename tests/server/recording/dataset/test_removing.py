@@ -224,6 +224,7 @@ def test_on_a_full_disk_the_dataset_is_as_it_was_and_the_episode_leaves_it_when_
             assert said[-1].startswith("what dataset has of discarded episodes is tried again: ")
             assert files_of(root) == before
             assert not beside(root)
+        assert sum("tried again" in each for each in said) == 1
         ballast.unlink()
         following.look([path])
         assert events_of(root) == [A, F]

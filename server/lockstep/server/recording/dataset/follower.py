@@ -112,6 +112,7 @@ class DatasetFollower:
         self._discarded: Sequence[EventRange] = ()  # of all files at the last look
         self._staying: set[EventRange] = set()  # of which it was said that they cannot be taken out
         self._owes_removal = False  # the disk was full
+        self._trouble = ""  # that was said last, of a dataset that cannot be written; "": it can
 
     def take_wholes(self, paths: Sequence[Path]) -> None:
         """Append those of these files that have no episodes too, each as one, where `whole_recordings` allows it."""
@@ -216,10 +217,11 @@ class DatasetFollower:
             if not self._owes_removal:
                 self._staying.update(new)
             what = "is tried again" if self._owes_removal else "stays"
-            self._say(f"what {self._root.name} has of discarded episodes {what}: {error}")
+            self._say_trouble(f"what {self._root.name} has of discarded episodes {what}: {error}")
             recover(self._root)
             self._state = read_state(self._root) if is_dataset(self._root) else None
             return
+        self._trouble = ""
         if not taken:
             return
         if self._state is None:
@@ -253,11 +255,12 @@ class DatasetFollower:
                 self._pass_over(file, _key(stretch), left_out(stretch.path, stretch.episode, str(error)))
             else:
                 file.again = True
-                self._say(f"{self._root.name} cannot be written, and is tried again: {error}")
+                self._say_trouble(f"{self._root.name} cannot be written, and is tried again: {error}")
             if self._state is not None:
                 recover(self._root)
                 self._state = read_state(self._root)
             return False
+        self._trouble = ""
         out = f", {rows.left_out} events left out" if rows.left_out else ""
         if not stretch.episode:
             self._say(as_a_whole(stretch.path, stretch.task))
@@ -296,6 +299,12 @@ class DatasetFollower:
                 state.notes, version=3, batches=before.batches, gone=before.gone, taken_out=before.taken_out
             )
         return state
+
+    def _say_trouble(self, said: str) -> None:
+        """Say it once, and not at every look."""
+        if said != self._trouble:
+            self._trouble = said
+            self._say(said)
 
     def _pass_over(self, file: _File, key: Key, said: str) -> None:
         if key not in file.passed:
