@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from lockstep.robot_bridge.kinematics.chain import Chain, ChainState
 from lockstep.robot_bridge.kinematics.clearance import GapSource
-from lockstep.robot_bridge.kinematics.gap_limits import GapLimits, gap_limits
+from lockstep.robot_bridge.kinematics.gap_limits import GapLimits, clipped, gap_limits
 from lockstep.robot_bridge.kinematics.near_gaps import NearGaps
 from lockstep.robot_bridge.kinematics.rotations import rotation_vector
 from lockstep.robot_bridge.kinematics.task_order import Damping, TaskOrder, task_order
@@ -81,6 +81,8 @@ class Prepared(NamedTuple):
     state: ChainState
     slowest: Array
     fastest: Array
+    lowest: Array  # rad or m: no joint goes beyond, nor further beyond if it is already
+    highest: Array
     gaps: GapLimits
     order: TaskOrder  # with all joints free, where nothing binds
 
@@ -117,7 +119,8 @@ class PoseSolver:
         gaps = self._near(here, state, before)
         order = self._order(state, np.ones(len(here), dtype=bool), gaps, [])
         kept = None if before is None else tuple(before)
-        return Prepared(tuple(joints), kept, here, state, slowest, fastest, gaps, order)
+        lowest, highest = np.minimum(self._lower, here), np.maximum(self._upper, here)
+        return Prepared(tuple(joints), kept, here, state, slowest, fastest, lowest, highest, gaps, order)
 
     def step(
         self,
@@ -147,12 +150,13 @@ class PoseSolver:
         here, state, gaps = prepared.here, prepared.state, prepared.gaps
         tuning = self._tuning
         error = position - state.position
+        missing = _length(error)
         wanted = tuning.gain * _shortened(error, tuning.longest) + (0.0 if velocity is None else velocity)
         wanted = _shortened(wanted, tuning.fastest)
         turn, angle, away = np.zeros(3), 0.0, 0.0
         if self._turns:
             whole = rotation_vector(rotation @ state.rotation.T)
-            away = float(np.sqrt(whole @ whole))
+            away = _length(whole)
             if turns:
                 askew = _shortened(whole, tuning.widest)
                 angle = min(away, tuning.widest)
@@ -162,7 +166,7 @@ class PoseSolver:
         # a goal that can be reached is approached.
         part = tuning.gain * (seconds + self._ramp / 2)  # the time in which a rate follows what is solved here
         speeds = [wanted, turn][: len(prepared.order.tasks)]
-        residuals = [part * tuning.bend * min(float(np.sqrt(error @ error)), tuning.longest), part * angle]
+        residuals = [part * tuning.bend * min(missing, tuning.longest), part * angle]
         del residuals[len(speeds) :]
         if tuning.turns_first:
             speeds.reverse()
@@ -170,21 +174,21 @@ class PoseSolver:
         rates, limited, bind = self._within(prepared, speeds, residuals)
         rates, more = gaps.apart(rates)
         near = tuple(dict.fromkeys(gaps.what[number] for number in (*bind, *more)))
-        ratio = float(np.max(np.abs(rates) / self._rates)) if share > 0.0 else math.inf
+        ratio = max(map(abs, (rates / self._rates).tolist())) if share > 0.0 else math.inf
         rates = rates * (min(1.0, share / ratio) if ratio > 0.0 else 1.0)
         if before is not None:
             last, most = np.array(before), self._accelerations * seconds
             rates = gaps.changed(rates, last - most, last + most, last * max(0.0, 1.0 - seconds / self._ramp))
-        after = here + np.clip(rates, prepared.slowest, prepared.fastest) * seconds
-        after = np.clip(after, np.minimum(self._lower, here), np.maximum(self._upper, here))
+        after = here + clipped(rates, prepared.slowest, prepared.fastest) * seconds
+        after = clipped(after, prepared.lowest, prepared.highest)
         made = tuple(((after - here) / seconds).tolist())
-        return Solution(tuple(after.tolist()), made, limited, near, float(np.linalg.norm(error)), away)
+        return Solution(tuple(after.tolist()), made, limited, near, missing, away)
 
     def _speeds(self, here: Array) -> tuple[Array, Array]:
         """Return each joint's range of speeds: slower near the end of its range, and only inwards beyond it."""
         gain = self._tuning.limit_gain
-        slowest = np.clip(gain * (self._lower - here), -self._rates, 0.0)
-        fastest = np.clip(gain * (self._upper - here), 0.0, self._rates)
+        slowest = clipped(gain * (self._lower - here), -self._rates, 0.0)
+        fastest = clipped(gain * (self._upper - here), 0.0, self._rates)
         return slowest, fastest
 
     def _near(self, here: Array, state: ChainState, before: Sequence[float] | None) -> GapLimits:
@@ -232,6 +236,8 @@ class PoseSolver:
                 limited.clear()
             else:
                 break
+        if not limited:
+            return rates, (), bind
         ended = np.minimum(here - self._lower, self._upper - here) < self._tuning.end
         return rates, tuple(number for number in limited if ended[number]), bind
 
@@ -246,6 +252,10 @@ class PoseSolver:
         return task_order(jacobians, free, gaps.gradients[bind], gaps.most[bind], gaps.steep[bind])
 
 
+def _length(vector: Array) -> float:
+    return math.sqrt(vector @ vector)
+
+
 def _shortened(vector: Array, longest: float) -> Array:
-    length = float(np.sqrt(vector @ vector))
+    length = _length(vector)
     return vector if length <= longest else vector * (longest / length)

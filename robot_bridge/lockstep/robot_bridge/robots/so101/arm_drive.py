@@ -33,6 +33,13 @@ class _Tool(NamedTuple):
     vector: Array  # rad, the rotation as a vector
 
 
+class _Goal(NamedTuple):
+    """Of the tool."""
+
+    position: Array
+    rotation: Array  # 3 x 3
+
+
 class ArmDrive:
     """Keeps the joint goals. They never move faster than `rates`, whatever is applied.
 
@@ -50,7 +57,7 @@ class ArmDrive:
         self._goals = tuple(posture)
         self._before: tuple[float, ...] | None = None  # values of the tick before
         self._joints: tuple[float, ...] | None = None  # goals of the joints while they are driven
-        self._pose: tuple[float, ...] | None = None  # goals of the tool while it is driven
+        self._pose: _Goal | None = None  # while the tool is driven
         self._motion = np.zeros(6)  # m/s and rad/s, of that goal in the present tick
         self._solved = (0.0,) * self._count  # rad/s, in the last tick for the tool
         self._still = math.inf  # s since the pose's goal changed or was pursued
@@ -149,15 +156,16 @@ class ArmDrive:
             self._joints, self._pose = joints, None
             self.faults = []
         elif begins or _differ(pose, before[self._count :]):
+            goal = _Goal(np.array(pose[:3]), from_rotation_vector(pose[3:]))
             if self._pose is None:  # in the first tick the goal was read anew, which is no motion
                 self._solved = (0.0,) * self._count
                 self._turns = True
             else:
-                self._motion = _motion(self._pose, pose) / seconds
-            self._joints, self._pose = None, pose
+                self._motion = _motion(self._pose, goal) / seconds
+            self._joints, self._pose = None, goal
             self._still = 0.0
 
-    def _follow_pose(self, pose: tuple[float, ...], seconds: float) -> None:
+    def _follow_pose(self, pose: _Goal, seconds: float) -> None:
         share = min(max((SETTLES - self._still) / SLOWS, 0.0), 1.0)
         self._still += seconds
         if share == 0.0:  # the bridge reads its goals anew, from here
@@ -166,8 +174,8 @@ class ArmDrive:
             return
         solution = self._solver.step(
             self._goals,
-            np.array(pose[:3]),
-            from_rotation_vector(pose[3:]),
+            pose.position,
+            pose.rotation,
             seconds,
             velocity=self._motion[:3],
             spin=self._motion[3:],
@@ -190,11 +198,11 @@ class ArmDrive:
         return self._tool
 
 
-def _differ(values: Sequence[float], others: Sequence[float]) -> bool:
-    return any(abs(value - other) > SAME for value, other in zip(values, others, strict=True))
+def _differ(values: tuple[float, ...], others: tuple[float, ...]) -> bool:
+    return values != others and any(abs(value - other) > SAME for value, other in zip(values, others, strict=True))
 
 
-def _motion(before: Sequence[float], after: Sequence[float]) -> Array:
-    """Return the way between two poses, m, and the turn, rad as a rotation vector."""
-    turn = rotation_vector(from_rotation_vector(after[3:]) @ from_rotation_vector(before[3:]).T)
-    return np.concatenate((np.subtract(after[:3], before[:3]), turn))
+def _motion(before: _Goal, after: _Goal) -> Array:
+    """Return the way between two goals, m, and the turn, rad as a rotation vector."""
+    turn = rotation_vector(after.rotation @ before.rotation.T)
+    return np.concatenate((after.position - before.position, turn))
