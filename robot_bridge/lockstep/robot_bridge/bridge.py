@@ -18,6 +18,7 @@ from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
 from lockstep.robot_bridge.control.tick_alarm import TickAlarm
 from lockstep.robot_bridge.control.tick_loop import TickLoop
+from lockstep.robot_bridge.control.work_ahead import WorkAhead
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.description.check_axes import check_braking
 from lockstep.robot_bridge.description.check_description import check_description
@@ -129,7 +130,7 @@ class Bridge:
         )
         self._dialer = None if settings.console is None else _dialer(settings.console, self._links)
         self._ticks = TickLoop(
-            *(robot, description.hold, shaper, executor, measured, self._stops),
+            *(robot, description.hold, shaper, executor, WorkAhead(robot, measured), self._stops),
             *(self._watchdogs, self._liveness, self._links.publisher, alarm, counters),
             now,
         )

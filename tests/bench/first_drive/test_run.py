@@ -22,11 +22,16 @@ class Losing(MyArm):
 
     def apply(self, values):
         self.ticks += self.ticks > 0 or any(values)
-        self.withheld = 0 < self.ticks < 50 or (self.withheld and any(values))
+        self.withheld = self.lost or (self.withheld and any(values))
         super().apply([0.0, 0.0] if self.withheld else values)
 
+    @property
+    def lost(self):
+        return 0 < self.ticks < 50
+
     def measure(self):
-        return super().measure()._replace(faults=["let go of the controls once"] if self.withheld else [])
+        faults = ["motors lost"] if self.lost else ["let go of the controls once"] if self.withheld else []
+        return super().measure()._replace(faults=["the lamp is broken", *faults])
 """
 
 
@@ -50,7 +55,7 @@ async def test_a_robot_from_the_template_is_driven_and_shows_its_picture(tmp_pat
 
 
 @pytest.mark.timeout(300)
-async def test_a_robot_that_is_lost_as_it_starts_is_driven_once_the_controls_were_let_go(
+async def test_a_robot_with_a_fault_that_is_lost_as_it_starts_is_driven_once_the_controls_were_let_go(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "losing.py").write_text(LOSING)

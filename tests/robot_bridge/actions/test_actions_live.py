@@ -1,6 +1,7 @@
 """Actions of a whole bridge over real TCP: what moves the robot lives only while armed events renew it."""
 
 import asyncio
+import math
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from pathlib import Path
 from typing import cast
@@ -174,6 +175,33 @@ async def test_without_renewal_the_robot_is_at_rest_when_hold_has_passed(tmp_pat
     began = cast(float, log_lines(log, "action")[0]["time"])
     assert any(values != NEUTRAL for when, values in robot.applied if when >= began)
     assert all(values == NEUTRAL for when, values in robot.applied if when >= began + hold + MARGIN)
+
+
+async def test_over_a_path_that_takes_longer_than_hold_home_goes_on_with_each_renewal(tmp_path: Path) -> None:
+    robot, log = HomingRobot(), tmp_path / "events.jsonl"
+    robot._state = PlanarState(x=1.5, y=0.2, yaw=0.3)
+
+    def is_home() -> bool:
+        return math.hypot(*robot.state[:2]) < 0.02
+
+    async with running_bridge(robot, event_log=log) as bridge, operator(bridge) as driver:
+        robot._home = (0.0, 0.0, 0.0)
+        await ask(driver, "home")
+        rests = 0
+        while not is_home():
+            await robot.until(lambda: robot.applied[-1][1] != NEUTRAL or is_home(), "it moves")
+            await robot.until(lambda: robot.applied[-1][1] == NEUTRAL, "it rests, because nothing renews it")
+            while not (await driver.drive(list(NEUTRAL))).at_rest:
+                pass
+            rests += 1
+            await renew(driver)
+        final = await until_final(driver, renews="id-1")
+        assert (final.state, final.text) == ("done", "at home")
+        hold = bridge.description.hold
+    assert rests > 1
+    renewed = [cast(float, line["time"]) for kind in ("action", "executed") for line in log_lines(log, kind)]
+    for when, values in robot.applied:
+        assert values == NEUTRAL or any(each - MARGIN < when < each + hold + MARGIN for each in renewed)
 
 
 async def stick(driver: Operator) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from lockstep.robot_bridge.control.tick_alarm import TickAlarm
+from lockstep.robot_bridge.control.work_ahead import WorkAhead
 from lockstep.robot_bridge.link.sending.link_publisher import LinkPublisher
 from tests.robot_bridge.bridge_helpers import DRIVE, PATIENCE, RecordingRobot, log_lines, operator, running_bridge
 
@@ -57,6 +58,23 @@ async def test_a_robot_that_no_command_hurries_is_prepared_after_every_tick() ->
         while len(order) < 20:
             await driver.drive(DRIVE)
     assert order[:20] == ["tick", "prepare"] * 10
+
+
+async def test_where_the_work_ahead_takes_too_long_nothing_gives_way_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    pauses: list[float] = []
+
+    async def noted_pause(self: TickAlarm, seconds: float) -> bool:
+        pauses.append(seconds)
+        return True
+
+    monkeypatch.setattr(TickAlarm, "pause", noted_pause)
+    monkeypatch.setattr(WorkAhead, "seconds", property(lambda self: 1.0, lambda self, seconds: None), raising=False)
+    order: list[str] = []
+    async with running_bridge(Preparing(order)) as bridge, operator(bridge) as driver:
+        for _ in range(20):
+            await driver.drive(DRIVE)
+    assert not pauses
+    assert "prepare" in order, "a tick without a feedback is followed at once"
 
 
 async def test_a_bridge_that_closes_before_a_tick_is_prepared_did_not_lose_its_robot(

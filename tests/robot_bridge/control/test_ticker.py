@@ -54,3 +54,13 @@ def test_a_beat_may_come_early_as_soon_as_its_period_has_begun() -> None:
     assert metronome.wait(0.002) == pytest.approx(0.018), "the beat before came at 0.002"
     assert metronome.early(0.002) == pytest.approx(0.008)
     assert metronome.early(0.015) == 0.0
+
+
+def test_it_says_how_long_it_is_until_the_beat_after_this_one_and_until_that_may_come() -> None:
+    metronome = Ticker(0.01, 0.0)
+    metronome.wait(0.0)  # due at 0.01, and may come from 0
+    assert metronome.left(0.002) == pytest.approx(0.018)
+    assert metronome.until_early(0.002) == pytest.approx(0.008), "it came early"
+    assert metronome.left(0.011) == pytest.approx(0.009)
+    assert metronome.until_early(0.011) == 0.0
+    assert metronome.left(0.025) == pytest.approx(-0.005)

@@ -2,6 +2,7 @@
 
 import asyncio
 import sys
+from collections.abc import Sequence
 
 from lockstep.bench.harness.asked import say
 from lockstep.bench.harness.driving import axis_values, drive_on
@@ -17,8 +18,8 @@ LONGEST = 60.0  # s, until it moves
 async def drive_until_moved(link: str) -> int:
     """Drive the first axis until a joint has moved; return the event in which it had.
 
-    As a person would, this lets go of the controls for as long as the robot names a fault: a robot that cannot be seen
-    or does not listen yet moves only when they were let go since.
+    As a person would, this lets go of the controls when the robot names another fault, until it is at rest: a robot
+    that could not be seen or did not listen moves only when they were let go since.
 
     Raises:
         TimeoutError: none moves; with what the robot says of itself.
@@ -29,9 +30,14 @@ async def drive_until_moved(link: str) -> int:
         speed = axis_values(axes, {0: SHARE * axes[0].maximum})
         rest = axis_values(axes, {})
         first = last = await drive_on(console, rest)
+        seen: Sequence[str] = ()
+        lets_go = False
         end = asyncio.get_running_loop().time() + LONGEST
         while max(abs(now - then) for now, then in zip(last.joints, first.joints, strict=True)) < MOVED:
-            if last.faults or last.unknown:
+            trouble = (*last.faults, *last.unknown)
+            lets_go = trouble not in ((), seen) or (lets_go and not last.at_rest)
+            seen = trouble
+            if lets_go:
                 first = last = await drive_on(console, rest)
             else:
                 last = await drive_on(console, speed)

@@ -49,6 +49,11 @@ class ActionRunner:
         """True while an action moves the robot."""
         return bool(self._core.moving)
 
+    @property
+    def acts(self) -> bool:
+        """True while an action moves the robot and does not wait to be renewed."""
+        return self.moving and not self._core.waits(self._now())
+
     # The link
 
     def link_opened(self, link: LinkTransport) -> None:
@@ -109,12 +114,14 @@ class ActionRunner:
         self._cancelled(self._core.look(robot_now(self._events, self._shaper, self._now())))
 
     def step(self) -> None:
-        """Let every action go on for one tick.
+        """Let every action go on for one tick, but one that waits to be renewed.
 
         Raises:
             BaseException: the adapter raised.
         """
         for id, run in list(self._runs.items()):
+            if id == self._core.moving and self._core.waits(self._now()):
+                continue
             try:
                 self._stepped(id, run.step())
             except ActionFailed as error:
@@ -126,6 +133,8 @@ class ActionRunner:
             return
         robot = robot_now(self._events, self._shaper, self._now())
         self._reports.tell(self._core.progress(id, step.progress, step.text, robot), is_new=False)
+        if id == self._core.moving:
+            self._core.drives_axes(step.values is not None)
         if step.values is not None:
             if id != self._core.moving:
                 raise ValueError("an action that is not declared to move drives axes")

@@ -15,10 +15,10 @@ from collections.abc import Iterator
 from lockstep.robot_bridge.control.clock import Clock
 from lockstep.robot_bridge.control.coming_to_rest import ComingToRest
 from lockstep.robot_bridge.control.command_executor import CommandExecutor
-from lockstep.robot_bridge.control.goals.measured_axes import MeasuredAxes
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.tick_alarm import TickAlarm
 from lockstep.robot_bridge.control.ticker import Ticker
+from lockstep.robot_bridge.control.work_ahead import WorkAhead
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.errors import RobotFailed, RobotUnavailable, named
 from lockstep.robot_bridge.link.sending.link_publisher import LinkPublisher
@@ -29,9 +29,8 @@ from lockstep.robot_bridge.watchdog.watchdogs import Watchdogs
 
 __all__ = ["TickLoop"]
 
-# s from a feedback until the next tick is prepared. The command that answers the feedback takes longer to come, and
-# whoever is to read the feedback may have to share the processors.
-GIVE_WAY = 0.002
+GIVE_WAY = 0.002  # s from a feedback until work ahead: whoever is to read it may have to share the processors
+TIMER = 0.001  # s by which a timer may be late
 REST_MARGIN = 0.5  # s on top of hold for the robot to come to rest when the bridge closes
 MAX_CATCH_UP = 3  # ticks made good after the loop was blocked; the rest are skipped
 
@@ -47,7 +46,7 @@ class TickLoop:
         hold: float,
         shaper: AxisShaper,
         executor: CommandExecutor,
-        measured: MeasuredAxes,
+        ahead: WorkAhead,
         stops: StopHandler,
         watchdogs: Watchdogs,
         liveness: Liveness,
@@ -61,7 +60,7 @@ class TickLoop:
         self._hold = hold
         self._shaper = shaper
         self._executor = executor
-        self._measured = measured
+        self._ahead = ahead
         self._stops = stops
         self._watchdogs = watchdogs
         self._liveness = liveness
@@ -131,16 +130,18 @@ class TickLoop:
             with _calls_of_the_robot():
                 is_fed_back = self.tick()
                 self._liveness.ticked()
-            if await self._has_time(is_fed_back):
+            if not (is_fed_back and self._robot.ticks_on_command) or await self._gave_way(metronome):
                 with _calls_of_the_robot():
-                    self._robot.prepare()
-                    self._measured.measure_ahead()
+                    self._ahead.do()
 
-    async def _has_time(self, is_fed_back: bool) -> bool:
-        """Give way to whoever reads the feedback that was sent; return whether there is time to prepare a tick."""
-        if is_fed_back and self._robot.ticks_on_command:
-            return await self._alarm.pause(min(GIVE_WAY, self._robot.tick_seconds / 2))
-        return True
+    async def _gave_way(self, metronome: Ticker) -> bool:
+        """Give way to whoever reads the feedback that was sent; return whether there is time for work ahead then."""
+        seconds = min(GIVE_WAY, metronome.left(time.monotonic()) - self._ahead.seconds - TIMER)
+        if seconds < TIMER:
+            return False
+        if await self._alarm.pause(seconds):
+            return True
+        return self._ahead.seconds < metronome.until_early(time.monotonic())
 
     async def _wait(self, metronome: Ticker) -> None:
         """Wait for the next tick."""

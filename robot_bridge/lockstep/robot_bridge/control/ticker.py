@@ -29,3 +29,11 @@ class Ticker:
     def early(self, now: float) -> float:
         """Return the seconds until the beat that `wait` announced may come: its period has begun then; 0 if it has."""
         return max(0.0, self._next - self._period - now)
+
+    def left(self, now: float) -> float:
+        """Return the seconds until the beat after the one that `wait` announced last is due; negative: overdue."""
+        return self._next + self._period - now
+
+    def until_early(self, now: float) -> float:
+        """Return the seconds until that beat may come; 0 if it may now."""
+        return max(0.0, self._next - now)

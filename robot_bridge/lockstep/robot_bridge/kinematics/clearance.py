@@ -77,7 +77,9 @@ class Clearance:
         self._columns = np.array([pair[:2] for pair in self._pairs], dtype=int).reshape(-1, 2).T
         reaches = np.array([math.dist(each.start, each.end) / 2 + each.radius for each in capsules.values()])
         self._reaches = reaches[self._columns].sum(axis=0)  # m, of both capsules around their middles
-        self.levers = np.array([self._levers(capsules, *pair) for pair in pairs]).reshape(-1, len(chain.joints))
+        radii = [each.radius for each in capsules.values()]
+        levers = [self._levers(radii, *pair) for pair in self._columns.T.tolist()]
+        self.levers: Array = np.array(levers).reshape(-1, len(chain.joints))
 
     def gaps(self, state: ChainState, within: float, ahead: Array | None = None) -> list[Gap]:
         """Return the gaps of the pairs that are closer than `within` (m), or come so by the motion `ahead`."""
@@ -99,12 +101,10 @@ class Clearance:
                 widths[number] = min(within, math.dist(here, there) - radii)
         return widths
 
-    def _levers(self, capsules: Mapping[str, Capsule], one: str, other: str) -> Array:
-        names = list(capsules)
-        near, far = sorted((one, other), key=lambda name: self._ends[names.index(name)][0].moving)
-        ends = self._ends[names.index(far)]
-        extent = max(math.hypot(*end.position) for end in ends) + capsules[far].radius
-        return self._chain.levers(self._ends[names.index(near)][0].moving, ends[0].moving, extent)
+    def _levers(self, radii: Sequence[float], *pair: int) -> Array:
+        near, far = sorted(pair, key=lambda body: self._ends[body][0].moving)
+        extent = max(math.hypot(*end.position) for end in self._ends[far]) + radii[far]
+        return self._chain.levers(self._ends[near][0].moving, self._ends[far][0].moving, extent)
 
     def _ends_at(self, state: ChainState) -> Array:
         """Return where the capsules' ends are, m, capsules x 2 x 3."""

@@ -114,11 +114,9 @@ class Obstacles:
         widths = np.full((len(self._bodies), len(self._obstacles)), within)
         if widths.size:
             for body, obstacles in self._near(state, within, None):
-                radii = self._bodies[body][2]
                 for number in obstacles:
-                    obstacle = self._obstacles[number]
-                    beyond = np.abs(self._along(obstacle, state, body)) - obstacle.half[:, None]
-                    widths[body, number] = min(within, float((_distances(beyond) - radii).min()))
+                    distances = self._seen(self._obstacles[number], state, body)[2]
+                    widths[body, number] = min(within, float(distances.min()))
         return widths.reshape(-1)
 
     def _levers(self, body: tuple[int, Array, Array], obstacle: Obstacle) -> Array:
@@ -132,10 +130,9 @@ class Obstacles:
         self, state: ChainState, body: int, obstacle: Obstacle, within: float, twists: tuple[Array, Array] | None
     ) -> Iterator[Gap]:
         """Yield the gaps between a body and an obstacle. Places and ways are along the obstacle's sides, 3 x n."""
-        moving, _, radii = self._bodies[body]
-        sides, places = obstacle.rotation.T, self._along(obstacle, state, body)
-        beyond = np.abs(places) - obstacle.half[:, None]
-        distances = soon = _distances(beyond) - radii
+        moving, sides = self._bodies[body][0], obstacle.rotation.T
+        places, beyond, distances = self._seen(obstacle, state, body)
+        soon = distances
         outward = None
         if twists is not None:
             outward = _outward(places, beyond)
@@ -150,12 +147,14 @@ class Obstacles:
             motion = self._chain.motion(state, moving, place)
             yield Gap(float(distances[number]), (obstacle.rotation @ out) @ motion, obstacle.name)
 
-    def _along(self, obstacle: Obstacle, state: ChainState, body: int) -> Array:
-        """Return the places of a body's surface from the obstacle's middle, along its sides, m, 3 x n."""
-        moving, points, _ = self._bodies[body]
+    def _seen(self, obstacle: Obstacle, state: ChainState, body: int) -> tuple[Array, Array, Array]:
+        """Return the places of a body's surface from an obstacle's middle along its sides, how far they are beyond
+        these (m, 3 x n both), and their distances (m)."""
+        moving, points, radii = self._bodies[body]
         begins = obstacle.rotation.T @ (state.places[moving] - obstacle.position)
-        places: Array = obstacle.rotation.T @ state.turns[moving] @ points + begins[:, None]
-        return places
+        places = obstacle.rotation.T @ state.turns[moving] @ points + begins[:, None]
+        beyond = np.abs(places) - obstacle.half[:, None]
+        return places, beyond, _distances(beyond) - radii
 
     def _near(
         self, state: ChainState, within: float, twists: tuple[Array, Array] | None

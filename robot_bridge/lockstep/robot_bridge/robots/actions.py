@@ -34,6 +34,8 @@ class ActionRun(ABC):
     def step(self) -> ActionStep:
         """Do the next part of the action. Called once a tick, before `apply`.
 
+        Not called while an action that drives the axes waits to be renewed: the axes are at rest then.
+
         Raises:
             ActionFailed: the action did not work.
         """

@@ -62,7 +62,8 @@ class MediaSource(ABC):
 class Robot(ABC):
     """A robot. All methods but `rest_from_thread` are called from the bridge's event loop and must return at once.
 
-    Order: `describe` first; then, every `tick_seconds`, `apply`, `tick` and `prepare`; `measure` right after a `tick`.
+    Order: `describe` first; then, every `tick_seconds`, `apply` and `tick`; `measure` right after a `tick`; `prepare`
+    where there is time before the next one.
     Values reach `apply` already clamped, slew-limited and, without a command to execute, at rest.
 
     With `ticks_on_command` a command begins the tick of the present period of `tick_seconds` at once. There is still
@@ -118,8 +119,9 @@ class Robot(ABC):
     def prepare(self) -> None:
         """Compute what the next `apply` and `tick` can use, whatever their values are, so that they take less time.
 
-        Called after each tick while the bridge runs. A robot that `ticks_on_command` gets it 2 ms after a feedback was
-        sent, and not at all when a command comes before. It must change nothing that the robot does.
+        Called after a tick while the bridge runs. Where a robot that `ticks_on_command` has sent a feedback, it is
+        called up to 2 ms later, so that others can read that first, and left out where the next tick comes before. It
+        must change nothing that the robot does.
         """
 
     @abstractmethod
@@ -129,8 +131,9 @@ class Robot(ABC):
     def measured_axes(self) -> Sequence[float]:
         """Return the measured value of each axis now, as in `measure`; NaN if unknown or too old to be trusted.
 
-        Called when the bridge starts, when a stop was reset, and while commands with goals come, once between two ticks
-        at most: `reach` bounds their distance from here. So it should cost little. Needed only for goal axes.
+        Called when the bridge starts, when a stop was reset, and for commands with goals, or ahead of them where that
+        takes a twentieth of a tick at most; once between two ticks. `reach` bounds the distance of goals from here. So
+        it should cost little. Needed only for goal axes.
         """
         return self.measure().axes
 

@@ -1,6 +1,7 @@
 """Episodes that are discarded after they were appended: their rows and pictures leave the dataset, and no others."""
 
 import asyncio
+import errno
 import os
 import random
 import shutil
@@ -229,6 +230,29 @@ def test_on_a_full_disk_the_dataset_is_as_it_was_and_the_episode_leaves_it_when_
         following.look([path])
         assert events_of(root) == [A, F]
         assert verify_dataset(root).ok
+
+
+def test_beside_an_episode_that_was_discarded_a_full_disk_is_said_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    later = episode("g", "start", 91, 91), episode("g", "kept", 91, 95, outcome="success")
+    file, said = GrowingFile(tmp_path / "a.mcap", (*RECORDS, *later)), list[str]()
+    following = follower(tmp_path / "dataset", said)
+    file.write_until(90)
+    following.look([file.path])
+    change(file.path, {"episode": "c", "dropped": True})
+    following.look([file.path])
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("lockstep.server.recording.dataset.follower.append", full)
+    said.clear()
+    for event in (96, 97, 98):
+        file.write_until(event)
+        following.look([file.path])
+    file.write_until(100)
+    assert said == ["dataset cannot be written, and is tried again: [Errno 28] No space left on device"]
 
 
 async def test_a_process_that_is_killed_at_any_moment_leaves_the_dataset_before_or_after(tmp_path: Path) -> None:

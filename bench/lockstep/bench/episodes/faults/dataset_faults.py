@@ -1,11 +1,13 @@
 """Faults of what is written: a disk that is full, an export that is killed, an episode that is discarded late."""
 
 import asyncio
+import errno
 import json
 import os
 import shutil
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Final
 
 from lockstep.bench.episodes.faults.fault_run import SECONDS, FaultRun, following
@@ -13,8 +15,9 @@ from lockstep.bench.harness.processes import started
 from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.client import RecordedEpisodes
 
-__all__ = ["LOW_BYTES", "discard_late", "fill_disk", "kill_export"]
+__all__ = ["LOW_BYTES", "discard_late", "fill_disk", "kill_export", "leave_free"]
 
+TRIES: Final = 10
 LOW_BYTES: Final = 8 << 20  # that are to stay free on the disk
 
 
@@ -43,14 +46,29 @@ async def fill_disk(run: FaultRun) -> None:
     """Fill the disk while an episode is open."""
     await run.begun()
     ballast = run.folder / "recordings" / "ballast"
-    free = shutil.disk_usage(ballast.parent).free
-    left = LOW_BYTES + LOW_BYTES // 8 if run.fault == "disk-low" else 64 << 10
-    with ballast.open("wb") as file:
-        os.posix_fallocate(file.fileno(), 0, max(1, free - left))
+    leave_free(ballast, LOW_BYTES + LOW_BYTES // 8 if run.fault == "disk-low" else 64 << 10)
     async with run.driving_on():
         await run.until(lambda state: state.phase == "idle", "the end of the episode")
         await run.refuses_to_keep()
     ballast.unlink()
+
+
+def leave_free(ballast: Path, left: int) -> None:
+    """Write a file that leaves so many bytes free on its disk, to which others may write meanwhile.
+
+    Raises:
+        OSError: they took what was to be left every time.
+    """
+    for again in reversed(range(TRIES)):
+        free = shutil.disk_usage(ballast.parent).free
+        try:
+            with ballast.open("wb") as file:
+                os.posix_fallocate(file.fileno(), 0, max(1, free - left))
+        except OSError as error:
+            if error.errno != errno.ENOSPC or not again:
+                raise
+        else:
+            return
 
 
 async def discard_late(run: FaultRun) -> None:

@@ -9,7 +9,7 @@ import msgspec
 
 from lockstep.protocol.actions import Act, ActionUpdate
 from lockstep.protocol.description import Action
-from lockstep.protocol.messages import Command, Feedback, Rest
+from lockstep.protocol.messages import Command, Feedback, Refusal, Rest
 from lockstep.protocol.serial import event_after
 from lockstep.robot_bridge.conformance.case import Case
 from lockstep.robot_bridge.conformance.driver import BY, Driver
@@ -19,7 +19,7 @@ from lockstep.robot_bridge.conformance.waiting import PATIENCE, SETTLE, within
 
 __all__ = ["ACTION_CASES"]
 
-HOLDS = 2  # times `hold` for which an action is renewed
+HOLDS = 2  # times `hold` for which an action is renewed, beyond what it might wait for a renewal
 TRIES = 5  # attempts where a busy machine holds up this program or the bridge
 HELD_UP = 1.5  # times `hold`: a motion that ended unrenewed so late is tried again
 ASKING = ("late", "too_often", "not_possible", "busy")  # refusals after which a case cannot be tried
@@ -151,10 +151,34 @@ async def _stopped(subject: Subject) -> None:
 async def _hold(subject: Subject) -> None:
     async with subject.operator() as driver:
         act = await _begun(driver)
-        await _ended(driver, act, "not_renewed")
+        began, hold = driver.feedback.time, driver.description.hold
+        said = await _unrenewed(driver, act, began + hold + SETTLE)
+        expect(driver.feedback.at_rest, f"the action goes on: the robot moves when it was not renewed for {hold:g} s")
+        if said.state == "running":  # it may wait to be renewed, but not for ever
+            said = await _unrenewed(driver, act, began + _longest_wait(driver) + SETTLE)
+        expect(said.state != "running", "the action goes on; it had to end: not_renewed")
+        needs(said.state == "cancelled", f"the action was {said.state} before it had to be cancelled")
+        expect(said.reason == "not_renewed", f"cancelled {said.reason!r}, not 'not_renewed'")
         driver.peer.send(act)
         said = await _told(driver, act.id)
         expect(said.state == "cancelled", f"a repeat of a request that was cancelled is {said.state}: it began again")
+
+
+def _longest_wait(driver: Driver) -> float:
+    """Return after how many s without a renewal an action has to be cancelled."""
+    return max(driver.description.hold, driver.description.max_event_age)
+
+
+async def _unrenewed(driver: Driver, act: Act, until: float) -> ActionUpdate:
+    """Send neutral commands that name no action until the robot's clock says so; return what became of the action."""
+    newest = ActionUpdate(id=act.id, name=act.name, state="running", event=driver.feedback.event)
+    async with within(until - driver.feedback.time + PATIENCE, "neutral commands are not answered"):
+        while driver.feedback.time < until:
+            driver.peer.send(driver.command(driver.neutral))
+            while not isinstance(said := await driver.next(), Feedback | Refusal):
+                if isinstance(said, ActionUpdate) and said.id == act.id:
+                    newest = said
+    return newest
 
 
 def _is_of(command: Command, feedback: Feedback) -> bool:
@@ -178,7 +202,7 @@ async def _kept_alive(driver: Driver) -> tuple[ActionUpdate, bool]:
     renewed, longest = loop.time(), 0.0  # sent; from there until the next was surely there
     act = await _begun(driver)
     began = driver.feedback.time
-    while driver.feedback.time - began < HOLDS * hold:
+    while driver.feedback.time - began < _longest_wait(driver) + HOLDS * hold:
         command = msgspec.structs.replace(driver.command(driver.neutral), action=act.id)
         sent = loop.time()
         driver.peer.send(command)

@@ -7,7 +7,7 @@ from lockstep.robot_bridge.robots.base import Robot
 
 __all__ = ["MeasuredAxes"]
 
-LATELY = 1.0  # s since a command asked, for which the next one's answer is measured ahead
+LATELY = 1.0  # s after a command asked, in which the axes are measured ahead of the next one
 
 
 class MeasuredAxes:
@@ -32,10 +32,12 @@ class MeasuredAxes:
             self._places = self._measure()
         return self._places
 
-    def measure_ahead(self) -> None:
-        """Ask the adapter now, if commands have asked lately: the next one that does is then answered at once."""
-        if self._places is None and self._unasked <= self._lately:
-            self._places = self._measure()
+    def measure_ahead(self) -> bool:
+        """Ask the adapter now if commands have asked lately: the next one need not. Return whether it was asked."""
+        if self._places is not None or self._unasked > self._lately:
+            return False
+        self._places = self._measure()
+        return True
 
     def _measure(self) -> Sequence[float]:
         try:

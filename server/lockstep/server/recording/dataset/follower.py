@@ -48,6 +48,7 @@ __all__ = ["DatasetFollower"]
 
 NOT_FOLLOWED = "it has no episodes, and what is followed are kept episodes alone; --append takes it, or says why not"
 DISCARDED = "it was discarded, in another copy of the recording"
+MOST_TROUBLES = 20  # that are said in a row, so that words that differ each time have an end
 FULL = (errno.ENOSPC, errno.EDQUOT)
 Key = tuple[str, int, int]  # of a stretch: its episode and its first and last event
 FILE: Key = ("", 0, 0)  # the file itself
@@ -112,7 +113,7 @@ class DatasetFollower:
         self._discarded: Sequence[EventRange] = ()  # of all files at the last look
         self._staying: set[EventRange] = set()  # of which it was said that they cannot be taken out
         self._owes_removal = False  # the disk was full
-        self._trouble = ""  # that was said last, of a dataset that cannot be written; "": it can
+        self._troubles: set[str] = set()  # that were said of a dataset that cannot be written, since it could be
 
     def take_wholes(self, paths: Sequence[Path]) -> None:
         """Append those of these files that have no episodes too, each as one, where `whole_recordings` allows it."""
@@ -221,9 +222,9 @@ class DatasetFollower:
             recover(self._root)
             self._state = read_state(self._root) if is_dataset(self._root) else None
             return
-        self._trouble = ""
         if not taken:
             return
+        self._troubles.clear()
         if self._state is None:
             self._begin_anew(notes)
         names = ", ".join(each.episode or f"all of {each.recording}" for each in taken)
@@ -260,7 +261,7 @@ class DatasetFollower:
                 recover(self._root)
                 self._state = read_state(self._root)
             return False
-        self._trouble = ""
+        self._troubles.clear()
         out = f", {rows.left_out} events left out" if rows.left_out else ""
         if not stretch.episode:
             self._say(as_a_whole(stretch.path, stretch.task))
@@ -302,8 +303,8 @@ class DatasetFollower:
 
     def _say_trouble(self, said: str) -> None:
         """Say it once, and not at every look."""
-        if said != self._trouble:
-            self._trouble = said
+        if said not in self._troubles and len(self._troubles) < MOST_TROUBLES:
+            self._troubles.add(said)
             self._say(said)
 
     def _pass_over(self, file: _File, key: Key, said: str) -> None:

@@ -1,0 +1,93 @@
+"""What is done between two ticks, and what is not."""
+
+from collections.abc import Sequence
+
+import pytest
+
+from lockstep.robot_bridge.control import work_ahead
+from lockstep.robot_bridge.control.goals.measured_axes import MeasuredAxes
+from lockstep.robot_bridge.control.work_ahead import DEAR, WorkAhead
+from tests.robot_bridge.control.goals.goal_helpers import HangingArm
+
+
+class Clock:
+    now = 0.0
+
+    def perf_counter(self) -> float:
+        return self.now
+
+
+class Slow(HangingArm):
+    """Takes its time on a clock of the test."""
+
+    ticks_on_command = True
+    prepares = measures = 0.0  # s, that each takes
+    prepared = asked = 0
+
+    def __init__(self, clock: Clock) -> None:
+        super().__init__()
+        self._clock = clock
+
+    def prepare(self) -> None:
+        self.prepared += 1
+        self._clock.now += self.prepares
+
+    def measured_axes(self) -> Sequence[float]:
+        self.asked += 1
+        self._clock.now += self.measures
+        return super().measured_axes()
+
+
+class OnTheBeat(Slow):
+    ticks_on_command = False
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr(work_ahead, "time", clock)
+    return clock
+
+
+def between_ticks(robot: Slow, times: int) -> WorkAhead:
+    """Do the work after so many ticks, in each of which a command with goals has asked before."""
+    places = MeasuredAxes(robot, 6)
+    ahead = WorkAhead(robot, places)
+    for _ in range(times):
+        places()
+        places.look()
+        ahead.do()
+        places()
+    return ahead
+
+
+def test_it_prepares_and_measures_and_says_how_long_that_took(clock: Clock) -> None:
+    robot = Slow(clock)
+    robot.prepares, robot.measures = 0.001, 0.5 * DEAR * robot.tick_seconds
+    ahead = between_ticks(robot, 3)
+    assert robot.prepared == 3
+    assert robot.asked == 1 + 3, "nothing is measured twice between two ticks"
+    assert ahead.seconds == pytest.approx(0.001 + robot.measures)
+
+
+def test_an_adapter_that_takes_long_to_measure_is_asked_by_commands_alone_from_then_on(clock: Clock) -> None:
+    robot = Slow(clock)
+    robot.measures = 2 * DEAR * robot.tick_seconds
+    places = MeasuredAxes(robot, 6)
+    ahead = WorkAhead(robot, places)
+    places()
+    for _ in range(10):
+        places.look()
+        ahead.do()
+    assert robot.asked == 2
+    assert robot.prepared == 10
+
+
+def test_a_robot_whose_commands_wait_for_a_tick_is_not_measured_ahead(clock: Clock) -> None:
+    robot = OnTheBeat(clock)
+    places = MeasuredAxes(robot, 6)
+    ahead = WorkAhead(robot, places)
+    places()
+    places.look()
+    ahead.do()
+    assert (robot.asked, robot.prepared) == (1, 1)
