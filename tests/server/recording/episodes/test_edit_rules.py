@@ -57,6 +57,13 @@ def test_a_part_is_changed_alone_and_its_trim_stays_within_the_part() -> None:
     assert result.without_effect == {3: "a trim stays within the events 15 to 20"}
 
 
+@pytest.mark.parametrize("task", ["", "  "])
+def test_an_episode_keeps_its_task_where_it_would_have_none(task: str) -> None:
+    result = apply_edits(RECORDED, [edit("a", task=task, outcome="failure")])
+    assert only(result.episodes, "a").entry == RECORDED[0]
+    assert result.without_effect == {1: "a task is said in words"}
+
+
 def test_a_trim_can_be_widened_again_up_to_what_was_recorded() -> None:
     assert stretches(edit("a", first_event=15), edit("a", first_event=10))[0] == ("a", 10, 20, "kept")
 

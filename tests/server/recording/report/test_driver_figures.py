@@ -1,11 +1,11 @@
 from typing import Literal
 
-import msgspec
 import pytest
 
 from lockstep.protocol.console import DriverKind, ShadowJudgement
 from lockstep.protocol.episodes import EpisodeOutcome
-from lockstep.server.recording.format.records import EpisodeRecord, FeedbackRecord, ShadowRecord
+from lockstep.server.recording.format.episodes import EpisodeEntry
+from lockstep.server.recording.format.records import FeedbackRecord, ShadowRecord
 from lockstep.server.recording.report.driver_figures import MOST, DriverTally, Outcomes
 
 
@@ -18,9 +18,13 @@ def _event(tally: DriverTally, event: int, name: str, kind: DriverKind, *, inter
     )  # fmt: skip
 
 
-def _episode(tally: DriverTally, kind: Literal["start", "kept", "discarded"], outcome: EpisodeOutcome = "") -> None:
-    fields = {"epoch": "e", "event": 1, "episode": "x", "number": 1, "task": "t", "first_event": 1, "last_event": 1}
-    tally.take(msgspec.convert({**fields, "kind": kind, "outcome": outcome}, EpisodeRecord))
+def _episode(
+    first: int, last: int, outcome: EpisodeOutcome = "", state: Literal["kept", "discarded", "cut"] = "kept"
+) -> EpisodeEntry:
+    return EpisodeEntry(
+        id=f"{first}", number=1, state=state, task="t", outcome=outcome, first_event=first, last_event=last,
+        started=first, ended=last,
+    )  # fmt: skip
 
 
 def _shadow(tally: DriverTally, judgement: ShadowJudgement, difference: float | None, kind: DriverKind) -> None:
@@ -35,11 +39,10 @@ def _shadow(tally: DriverTally, judgement: ShadowJudgement, difference: float | 
 def test_interventions_are_spells_for_each_minute_of_episodes_with_a_policy() -> None:
     tally = DriverTally()
     _event(tally, 1, "", "none")
-    _episode(tally, "start")
     for event in range(2, 62):  # 30 s
         corrects = event in (10, 11, 12, 40)
         _event(tally, event, *(("Ada", "human") if corrects else ("net", "policy")), intervention=corrects)
-    _episode(tally, "kept", "success")
+    tally.take_episodes([_episode(1, 61, "success")])
     assert tally.interventions == 2
     assert tally.policy_seconds == pytest.approx(30)
     assert tally.interventions_per_minute == pytest.approx(4)
@@ -50,23 +53,40 @@ def test_interventions_are_spells_for_each_minute_of_episodes_with_a_policy() ->
 
 def test_success_is_told_by_driver_and_what_nobody_said_counts_for_neither() -> None:
     tally = DriverTally()
-    for number, (name, kind, outcome) in enumerate(
+    net: tuple[str, DriverKind] = ("net", "policy")
+    driven: list[tuple[str, DriverKind]] = [("Ada", "human"), net, net, net, net, net]
+    for number, (name, kind) in enumerate(driven):
+        _event(tally, 10 * number + 2, name, kind)
+    tally.take_episodes(
         [
-            ("Ada", "human", "success"),
-            ("net", "policy", "success"),
-            ("net", "policy", "failure"),
-            ("net", "policy", ""),
+            _episode(1, 9, "success"),
+            _episode(11, 19, "success"),
+            _episode(21, 29, "failure"),
+            _episode(31, 39),
+            _episode(41, 49, "success", "discarded"),
+            _episode(51, 59, "success", "cut"),
         ]
-    ):
-        _episode(tally, "start")
-        _event(tally, 10 * number + 2, name, kind)  # type: ignore[arg-type]
-        _episode(tally, "kept", outcome)  # type: ignore[arg-type]
-    _episode(tally, "start")
-    _event(tally, 90, "net", "policy")
-    _episode(tally, "discarded")
+    )
     assert tally.outcomes == {"Ada": Outcomes(success=1), "policy net alone": Outcomes(1, 1, 1)}
     assert tally.outcomes["policy net alone"].share == 0.5
     assert tally.interventions == 0
+
+
+def test_the_event_in_which_an_episode_begins_was_driven_before_it() -> None:
+    tally = DriverTally()
+    for event, name in ((2**31 - 2, "Grace"), (2**31 - 1, "Grace"), (1, "Ada"), (2, "Ada"), (3, "Grace")):
+        _event(tally, event, name, "human")
+    tally.take_episodes([_episode(2**31 - 1, 2, "failure")])
+    assert tally.outcomes == {"Ada": Outcomes(failure=1)}
+
+
+def test_all_events_of_an_episode_of_a_dataset_count() -> None:
+    tally = DriverTally()
+    for name in ("net", "other"):
+        _event(tally, 5, name, "policy")
+        _event(tally, 6, name, "policy")
+        tally.take_episode("success")
+    assert tally.outcomes == {"policy net alone": Outcomes(success=1), "policy other alone": Outcomes(success=1)}
 
 
 def test_a_shadow_is_compared_with_people_alone_and_never_agrees_out_of_limits() -> None:

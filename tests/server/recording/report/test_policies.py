@@ -17,6 +17,7 @@ from lockstep.server.recording.report.page import session_page
 from lockstep.server.recording.report.policies import policies_section
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from lockstep.server.recording.writing.writer import Entry
+from tests.server.recording.episodes.test_edited_datasets import change
 from tests.server.recording.makers import EPOCH, INTERVAL, START, Story, own_entry, rewritten
 from tests.server.recording.report.test_page import checked
 from tests.server.recording.test_episode_export import episode, recording
@@ -68,6 +69,17 @@ def test_a_session_tells_interventions_a_minute_success_by_driver_and_how_far_sh
     assert re.search(r"\{Grace\} human 7 0\.3 2 7 ", text)
     assert re.search(r"Ada 1 0 0 100 % .*policy net alone 0 1 0 0 % .*policy net corrected 1 0 0 100 %", text)
     assert re.search(r"net 1 in time 1 1 100 %", text)
+
+
+def test_a_session_tells_outcomes_and_interventions_of_episodes_as_they_were_changed_since(tmp_path: Path) -> None:
+    path = driven(tmp_path / "a.mcap")
+    change(path, {"episode": "a", "outcome": "failure"})
+    change(path, {"episode": "c", "dropped": True})
+    change(path, {"episode": "b", "first_event": 50, "last_event": 68})
+    text = plain(session_page(path))
+    assert re.search(r"Ada 0 1 0 0 % .*policy net corrected 1 0 0 100 %", text)
+    assert "policy net alone" not in text
+    assert "episodes in which a policy drove: 51.72 a minute." in text, "of 1.6 and 0.72 s"
 
 
 def test_a_session_of_people_alone_has_no_such_section(tmp_path: Path) -> None:

@@ -11,7 +11,8 @@ export function labelsForm(episode: Episode, change: (change: Change) => void): 
   const save = h("button", "field-button", { type: "submit" }, "Save");
   const follow = (): void => {
     for (const [value, each] of choices) setPressed(each, value === outcome);
-    save.disabled = task.value.trim() === episode.task && outcome === episode.outcome;
+    const words = task.value.trim();
+    save.disabled = words === "" || (words === episode.task && outcome === episode.outcome);
   };
   const choices = OUTCOMES.map(([value, label]) => {
     const choose = button("segment", label, () => {

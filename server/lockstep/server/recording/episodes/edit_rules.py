@@ -147,6 +147,8 @@ class _State:
         last = now.last_event if edit.last_event is None else edit.last_event
         if is_newer(target.first_bound, first) or is_newer(last, target.last_bound) or event_gap(last, first) <= 0:
             raise EditRefused(f"a trim stays within the events {target.first_bound} to {target.last_bound}")
+        if edit.task is not None and not edit.task.strip():
+            raise EditRefused("a task is said in words")
         is_dropped = target.is_dropped if edit.dropped is None else edit.dropped
         entry = msgspec.structs.replace(
             now,

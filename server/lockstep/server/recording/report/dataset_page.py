@@ -16,7 +16,7 @@ from lockstep.protocol.episodes import EpisodeOutcome
 from lockstep.protocol.serial import event_gap, is_event
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.lerobot_meta import DatasetNotes
-from lockstep.server.recording.format.records import EpisodeRecord, FeedbackRecord
+from lockstep.server.recording.format.records import FeedbackRecord
 from lockstep.server.recording.reading.picture_at import jpeg_of
 from lockstep.server.recording.report import page_parts as parts
 from lockstep.server.recording.report.dataset_figures import (
@@ -147,22 +147,9 @@ def _tally(rows: list[Row], notes: DatasetNotes) -> DriverTally:
     tally = DriverTally()
     for index, mine in groupby(rows, lambda row: int(row["episode_index"])):
         episode = notes.episodes[index]
-        first, last = episode.first_event, episode.last_event
-        begin = EpisodeRecord(
-            epoch=str(index),  # no time passes from one episode of a dataset to the next
-            event=first,
-            episode=episode.episode,
-            number=index + 1,
-            kind="start",
-            task=episode.task,
-            first_event=first,
-            last_event=first,
-        )
-        tally.take(begin)
         for row in mine:
-            tally.take(_driven(row, begin.epoch))
-        outcome = cast(EpisodeOutcome, episode.outcome) if episode.outcome in OUTCOMES else ""
-        tally.take(msgspec.structs.replace(begin, event=last, kind="kept", last_event=last, outcome=outcome))
+            tally.take(_driven(row, str(index)))  # no time passes from one episode of a dataset to the next
+        tally.take_episode(cast(EpisodeOutcome, episode.outcome) if episode.outcome in OUTCOMES else "")
     return tally
 
 

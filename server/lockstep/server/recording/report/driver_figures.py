@@ -7,12 +7,17 @@
 - A shadow agrees if each axis is within `AGREES` of its range of what a person did; out of limits never agrees.
 """
 
+from bisect import bisect_right
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from lockstep.protocol.console import DriverKind
+from lockstep.protocol.episodes import EpisodeOutcome
+from lockstep.protocol.serial import event_gap
 from lockstep.server.recording.format.drivers import NOBODY, EventDriver
-from lockstep.server.recording.format.records import EpisodeRecord, FeedbackRecord, OwnRecord, ShadowRecord
+from lockstep.server.recording.format.episodes import EpisodeEntry
+from lockstep.server.recording.format.records import FeedbackRecord, OwnRecord, ShadowRecord
 from lockstep.server.recording.reading.drivers import RecordedDrivers
 
 __all__ = ["AGREES", "LONGEST", "DriverTally", "Driven", "Outcomes", "Shadowed"]
@@ -61,7 +66,9 @@ class Shadowed:
 
 
 class DriverTally:
-    """Call `take` with the records of a recording, in order.
+    """Call `take` with the records of a recording, in order, and then `take_episodes`; again for each further part.
+
+    Of a dataset, call `take` with the feedback of an episode's rows, and then `take_episode`.
 
     Attributes:
         drivers: by name and kind
@@ -79,8 +86,7 @@ class DriverTally:
         self._event: tuple[str, int] = ("", 0)
         self._time = 0.0  # s, of the bridge, of the newest event
         self._before = NOBODY  # the newest event's driver
-        self._episode: list[EventDriver] = []  # drivers of the open one, each once
-        self._episode_seconds = 0.0
+        self._events: list[tuple[int, float, EventDriver]] = []  # of this part: event, s, and its driver
 
     @property
     def has_policy(self) -> bool:
@@ -101,10 +107,6 @@ class DriverTally:
         match record:
             case FeedbackRecord() if (record.epoch, record.event) != self._event:
                 self._feedback(record, self._reader.of(record))
-            case EpisodeRecord(kind="start"):
-                self._episode, self._episode_seconds = [], 0.0
-            case EpisodeRecord(kind="kept" | "discarded" | "cut"):
-                self._ended(record)
             case ShadowRecord():
                 self._shadow(record)
 
@@ -113,11 +115,9 @@ class DriverTally:
         seconds = min(max(0.0, feedback.time - self._time), LONGEST) if goes_on else 0.0
         self._event, self._time = (feedback.epoch, feedback.event), feedback.time
         before, self._before = self._before, driver
-        self._episode_seconds += seconds
+        self._events.append((feedback.event, seconds, driver))
         if driver.kind == "none":
             return
-        if driver not in self._episode and len(self._episode) < MOST:
-            self._episode.append(driver)
         key = (driver.name, driver.kind)
         if key not in self.drivers and len(self.drivers) >= MOST:
             return
@@ -128,23 +128,35 @@ class DriverTally:
             driven.intervention_events += 1
             driven.interventions += driver != before
 
-    def _ended(self, record: EpisodeRecord) -> None:
-        policies = sorted({each.name for each in self._episode if each.kind == "policy"})
-        if policies and record.kind != "cut":
-            self.policy_seconds += self._episode_seconds
-        if record.kind == "kept" and self._episode:
-            who = self._who(policies)
+    def take_episodes(self, episodes: Sequence[EpisodeEntry]) -> None:
+        """Count the episodes of the part, with all changes that were made to them since."""
+        begin = self._events[0][0] if self._events else 0
+        places = [event_gap(event, begin) for event, _, _ in self._events]
+        for each in episodes:
+            if each.state in ("kept", "discarded"):
+                # An episode begins when its first event was executed: that was driven before.
+                first, last = (bisect_right(places, event_gap(at, begin)) for at in (each.first_event, each.last_event))
+                self._count(self._events[first:last], each.outcome, is_kept=each.state == "kept")
+        self._events = []
+
+    def take_episode(self, outcome: EpisodeOutcome) -> None:
+        """Count everything that was taken since the last call as one kept episode."""
+        self._count(self._events, outcome, is_kept=True)
+        self._events = []
+
+    def _count(
+        self, events: Sequence[tuple[int, float, EventDriver]], outcome: EpisodeOutcome, *, is_kept: bool
+    ) -> None:
+        drivers = list(dict.fromkeys(driver for _, _, driver in events if driver.kind != "none"))[:MOST]
+        policies = sorted({each.name for each in drivers if each.kind == "policy"})
+        if policies:
+            self.policy_seconds += sum(seconds for _, seconds, _ in events)
+        if is_kept and drivers:
+            who = _who(drivers, policies)
             if who in self.outcomes or len(self.outcomes) < MOST:
                 outcomes = self.outcomes.setdefault(who, Outcomes())
-                name = record.outcome or "unsaid"
+                name = outcome or "unsaid"
                 setattr(outcomes, name, getattr(outcomes, name) + 1)
-        self._episode = []
-
-    def _who(self, policies: list[str]) -> str:
-        if not policies:
-            return ", ".join(sorted({each.name for each in self._episode}))
-        corrected = any(each.intervention for each in self._episode)
-        return f"policy {', '.join(policies)} {'corrected' if corrected else 'alone'}"
 
     def _shadow(self, record: ShadowRecord) -> None:
         if record.name not in self.shadows and len(self.shadows) >= MOST:
@@ -154,3 +166,10 @@ class DriverTally:
         if record.difference is not None and record.driver_kind == "human":
             shadow.compared += 1
             shadow.agreed += record.judgement == "in_time" and record.difference <= AGREES
+
+
+def _who(drivers: list[EventDriver], policies: list[str]) -> str:
+    if not policies:
+        return ", ".join(sorted({each.name for each in drivers}))
+    corrected = any(each.intervention for each in drivers)
+    return f"policy {', '.join(policies)} {'corrected' if corrected else 'alone'}"

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
+from lockstep.server.recording.episodes.edit_rules import edited
 from lockstep.server.recording.episodes.edits import read_edits
 from lockstep.server.recording.episodes.episode_list import ListedEpisode, listed_episodes
 from lockstep.server.recording.errors import RecordingError
@@ -108,6 +109,7 @@ def _facts(files: Sequence[Path]) -> SessionFacts:
                 edits = read_edits(path)
             except OSError:
                 edits = []
+            tally.take_episodes(edited(reader.index.episodes, edits))
             episodes += listed_episodes(entry_of(path, reader.info, reader.index), reader.index, edits).episodes
             mine = range(shown, min(len(totals.moments), MAX_SHOWN))
             pictures |= {at: _pictures(reader, totals.moments[at]) for at in mine}
