@@ -140,36 +140,36 @@ def test_a_renewal_that_comes_after_hold_is_too_late() -> None:
 def test_an_action_that_drives_the_axes_waits_for_its_renewal_and_ends_when_none_can_be_in_time() -> None:
     core = fresh()
     ask(core, act())
-    core.drives_axes(True)
-    assert not core.waits(HOLD - 0.001)
-    assert core.waits(HOLD)
+    core.renewal.drives_axes = True
+    assert not core.renewal.waits(HOLD - 0.001)
+    assert core.renewal.waits(HOLD)
     now = 0.0
     for _ in range(5):
         now += 3 * HOLD
         assert core.look(robot(now)) == []
         assert core.renewed("a", now)
-        assert not core.waits(now)
+        assert not core.renewal.waits(now)
     assert core.look(robot(now + AGE - 0.001)) == []
     assert reasons(core.look(robot(now + AGE))) == ["cancelled not_renewed"]
     assert not core.renewed("a", now + AGE)
-    assert not core.waits(now + AGE)
+    assert core.moving == ""
 
 
 def test_an_action_that_moves_the_robot_in_its_own_way_from_some_step_on_does_not_wait() -> None:
     core = fresh()
     ask(core, act())
-    core.drives_axes(True)
-    core.drives_axes(False)
+    core.renewal.drives_axes = True
+    core.renewal.drives_axes = False
     assert reasons(core.look(robot(HOLD))) == ["cancelled not_renewed"]
 
 
 def test_an_action_that_begins_is_none_that_waits_because_one_before_it_drove_the_axes() -> None:
     core = fresh()
     ask(core, act())
-    core.drives_axes(True)
+    core.renewal.drives_axes = True
     core.finish("a", "done", 8)
     assert ask(core, act("dock", "b")) == "running"
-    assert not core.waits(HOLD)
+    assert not core.renewal.waits(HOLD)
     assert reasons(core.look(robot(HOLD))) == ["cancelled not_renewed"]
 
 
@@ -184,8 +184,8 @@ def test_an_action_that_begins_is_none_that_waits_because_one_before_it_drove_th
 def test_what_ends_an_action_ends_one_that_waits(state: RobotNow, reason: str) -> None:
     core = fresh()
     ask(core, act())
-    core.drives_axes(True)
-    assert core.waits(2 * HOLD)
+    core.renewal.drives_axes = True
+    assert core.renewal.waits(2 * HOLD)
     assert reasons(core.look(state)) == [f"cancelled {reason}"]
     assert not core.renewed("a", 2 * HOLD)
 

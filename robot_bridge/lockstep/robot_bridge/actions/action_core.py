@@ -16,6 +16,7 @@ from lockstep.protocol.description import Action
 from lockstep.protocol.messages import StopState
 from lockstep.robot_bridge.actions.parameters import parameters_of
 from lockstep.robot_bridge.actions.recent_feedback import RecentFeedback
+from lockstep.robot_bridge.actions.renewal import Renewal
 from lockstep.robot_bridge.actions.request_outcomes import RequestOutcomes
 from lockstep.robot_bridge.errors import BadParameter
 
@@ -54,42 +55,23 @@ class Told(NamedTuple):
 class ActionCore:
     """Each id begins at most once. At most one action that moves the robot runs, and only while it is renewed.
 
-    An action that is not renewed for `hold` ends. One that drives the axes waits instead, because these are at rest
-    then: it goes on when it is renewed, and ends when that takes as long as `max_event_age`. So it gets there over a
-    path whose round trip takes longer than `hold`.
-
     Attributes:
         outcomes: what became of each request
+        renewal: of the action that moves the robot
     """
 
     def __init__(self, actions: Sequence[Action], *, hold: float, max_event_age: float) -> None:
         self._actions = {action.name: action for action in actions}
-        self._hold = hold
-        self._longest = max(hold, max_event_age)  # s, that an action waits for a renewal
+        self.renewal = Renewal(hold, max_event_age)
         self.outcomes = RequestOutcomes(max_event_age)
         self._feedback = RecentFeedback(max_event_age)
         self._running: dict[str, float] = {}  # ids that run -> s, when their progress was told last
         self._moving = ""
-        self._renewed_at = -math.inf
-        self._drives_axes = False  # the moving action does, by its last step
 
     @property
     def moving(self) -> str:
         """The id of the action that moves the robot; "" if none does."""
         return self._moving
-
-    @property
-    def renewed_at(self) -> float:
-        """The time (s) at which the moving action began or was renewed last."""
-        return self._renewed_at
-
-    def drives_axes(self, drives: bool) -> None:
-        """Note whether the moving action drives the axes, or moves the robot in a way of its own."""
-        self._drives_axes = drives
-
-    def waits(self, now: float) -> bool:
-        """Return whether the moving action waits to be renewed, and the axes rest."""
-        return self._moving != "" and self._drives_axes and now - self._renewed_at >= self._hold
 
     def issued(self, nonce: int, now: float) -> None:
         """Note a feedback: for `max_event_age` requests may answer it."""
@@ -124,7 +106,8 @@ class ActionCore:
         self.outcomes.add(update, robot.now)
         self._running[act.id] = robot.now
         if action.moves:
-            self._moving, self._renewed_at, self._drives_axes = act.id, robot.now, False
+            self._moving = act.id
+            self.renewal.begin(robot.now)
         return Begun(action, parameters, update)
 
     def _why_not(self, act: Act, action: Action, robot: RobotNow) -> ActionReason | None:
@@ -146,9 +129,9 @@ class ActionCore:
 
     def renewed(self, id: str, now: float) -> bool:
         """Note that a neutral command executed which names this action. True if it lets that action go on."""
-        if not id or id != self._moving or self._is_abandoned(now):
+        if not id or id != self._moving or self.renewal.is_over(now):
             return False
-        self._renewed_at = now
+        self.renewal.at = now
         return True
 
     def look(self, robot: RobotNow) -> list[ActionUpdate]:
@@ -159,12 +142,9 @@ class ActionCore:
             return self.interrupt("stopped", robot.event)
         if robot.neutral_needed:
             return self.interrupt("interrupted", robot.event)
-        if self._moving and self._is_abandoned(robot.now):
+        if self._moving and self.renewal.is_over(robot.now):
             return self.interrupt("not_renewed", robot.event)
         return []
-
-    def _is_abandoned(self, now: float) -> bool:
-        return now - self._renewed_at >= (self._longest if self._drives_axes else self._hold)
 
     def interrupt(self, reason: ActionReason, event: int) -> list[ActionUpdate]:
         """Cancel the moving action, and void requests for a motion that were decided before."""

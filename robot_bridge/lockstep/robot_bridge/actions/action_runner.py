@@ -22,7 +22,11 @@ _logger = logging.getLogger(__name__)
 
 
 class ActionRunner:
-    """Owns the runs of actions. Call `look` and then `step` in every tick, before the axes are driven."""
+    """Owns the runs of actions. Call `look` and then `step` in every tick, before the axes are driven.
+
+    Attributes:
+        waits: the action that moves the robot waited to be renewed in the last step
+    """
 
     def __init__(
         self,
@@ -34,6 +38,7 @@ class ActionRunner:
         log: EventLog,
         now: Callable[[], float],
     ) -> None:
+        self.waits = False
         self._robot = robot
         self._events = events
         self._shaper = shaper
@@ -48,11 +53,6 @@ class ActionRunner:
     def moving(self) -> bool:
         """True while an action moves the robot."""
         return bool(self._core.moving)
-
-    @property
-    def acts(self) -> bool:
-        """True while an action moves the robot and does not wait to be renewed."""
-        return self.moving and not self._core.waits(self._now())
 
     # The link
 
@@ -119,8 +119,9 @@ class ActionRunner:
         Raises:
             BaseException: the adapter raised.
         """
+        self.waits = self.moving and self._core.renewal.waits(self._now())
         for id, run in list(self._runs.items()):
-            if id == self._core.moving and self._core.waits(self._now()):
+            if self.waits and id == self._core.moving:
                 continue
             try:
                 self._stepped(id, run.step())
@@ -134,11 +135,11 @@ class ActionRunner:
         robot = robot_now(self._events, self._shaper, self._now())
         self._reports.tell(self._core.progress(id, step.progress, step.text, robot), is_new=False)
         if id == self._core.moving:
-            self._core.drives_axes(step.values is not None)
+            self._core.renewal.drives_axes = step.values is not None
         if step.values is not None:
             if id != self._core.moving:
                 raise ValueError("an action that is not declared to move drives axes")
-            self._axes.drive(step.values, self._core.renewed_at)
+            self._axes.drive(step.values, self._core.renewal.at)
 
     def _ended(self, id: str, update: ActionUpdate | None) -> None:
         self._runs.pop(id, None)

@@ -176,7 +176,7 @@ class CommandExecutor:
         self.note_motion()
         if not self._core.issue_due(now):
             return None
-        feedback = self._feedback.issue(acts=self._actions.acts)
+        feedback = self._feedback.issue(acts=self._actions.moving and not self._actions.waits)
         self._actions.issued(feedback.nonce, now)
         return feedback
 

@@ -83,6 +83,23 @@ class _File:
                 yield event_range(index.recording, index.epoch, each.first_bound, each.last_bound)
 
 
+class _Troubles:
+    """Why a dataset cannot be written: said once, and not at every look."""
+
+    def __init__(self, say: Say) -> None:
+        self._say = say
+        self._said: set[str] = set()  # since it could be written
+
+    def say(self, said: str) -> None:
+        if said not in self._said and len(self._said) < MOST_TROUBLES:
+            self._said.add(said)
+            self._say(said)
+
+    def end(self) -> None:
+        """It was written."""
+        self._said.clear()
+
+
 class DatasetFollower:
     """Hold the dataset's lock (`alone_with`), then call `look` again and again.
 
@@ -113,7 +130,7 @@ class DatasetFollower:
         self._discarded: Sequence[EventRange] = ()  # of all files at the last look
         self._staying: set[EventRange] = set()  # of which it was said that they cannot be taken out
         self._owes_removal = False  # the disk was full
-        self._troubles: set[str] = set()  # that were said of a dataset that cannot be written, since it could be
+        self._troubles = _Troubles(say)
 
     def take_wholes(self, paths: Sequence[Path]) -> None:
         """Append those of these files that have no episodes too, each as one, where `whole_recordings` allows it."""
@@ -218,13 +235,13 @@ class DatasetFollower:
             if not self._owes_removal:
                 self._staying.update(new)
             what = "is tried again" if self._owes_removal else "stays"
-            self._say_trouble(f"what {self._root.name} has of discarded episodes {what}: {error}")
+            self._troubles.say(f"what {self._root.name} has of discarded episodes {what}: {error}")
             recover(self._root)
             self._state = read_state(self._root) if is_dataset(self._root) else None
             return
         if not taken:
             return
-        self._troubles.clear()
+        self._troubles.end()
         if self._state is None:
             self._begin_anew(notes)
         names = ", ".join(each.episode or f"all of {each.recording}" for each in taken)
@@ -256,12 +273,12 @@ class DatasetFollower:
                 self._pass_over(file, _key(stretch), left_out(stretch.path, stretch.episode, str(error)))
             else:
                 file.again = True
-                self._say_trouble(f"{self._root.name} cannot be written, and is tried again: {error}")
+                self._troubles.say(f"{self._root.name} cannot be written, and is tried again: {error}")
             if self._state is not None:
                 recover(self._root)
                 self._state = read_state(self._root)
             return False
-        self._troubles.clear()
+        self._troubles.end()
         out = f", {rows.left_out} events left out" if rows.left_out else ""
         if not stretch.episode:
             self._say(as_a_whole(stretch.path, stretch.task))
@@ -300,12 +317,6 @@ class DatasetFollower:
                 state.notes, version=3, batches=before.batches, gone=before.gone, taken_out=before.taken_out
             )
         return state
-
-    def _say_trouble(self, said: str) -> None:
-        """Say it once, and not at every look."""
-        if said not in self._troubles and len(self._troubles) < MOST_TROUBLES:
-            self._troubles.add(said)
-            self._say(said)
 
     def _pass_over(self, file: _File, key: Key, said: str) -> None:
         if key not in file.passed:

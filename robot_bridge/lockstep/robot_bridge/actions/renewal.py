@@ -1,0 +1,35 @@
+"""How long an action that moves the robot goes on without a renewal. No I/O, no clock: the caller hands in `now`."""
+
+import math
+
+__all__ = ["Renewal"]
+
+
+class Renewal:
+    """Of the action that moves the robot. One that moves it in a way of its own ends after `hold`.
+
+    One that drives the axes waits instead, because these are at rest then: it goes on when it is renewed, and ends when
+    that takes as long as `max_event_age`. So it gets there over a path whose round trip takes longer than `hold`.
+
+    Attributes:
+        at: s, when the action began or was renewed last
+        drives_axes: the action does, by its last step
+    """
+
+    def __init__(self, hold: float, max_event_age: float) -> None:
+        self.at = -math.inf
+        self.drives_axes = False
+        self._hold = hold
+        self._longest = max(hold, max_event_age)
+
+    def begin(self, now: float) -> None:
+        """An action begins to move the robot."""
+        self.at, self.drives_axes = now, False
+
+    def waits(self, now: float) -> bool:
+        """Return whether the action waits to be renewed, and the axes rest."""
+        return self.drives_axes and now - self.at >= self._hold
+
+    def is_over(self, now: float) -> bool:
+        """Return whether it is too late to renew the action."""
+        return now - self.at >= (self._longest if self.drives_axes else self._hold)
