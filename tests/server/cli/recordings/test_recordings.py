@@ -47,6 +47,15 @@ def test_recordings_are_listed_in_words_and_as_json(directory: Path) -> None:
     assert json.loads(_lockstep(directory, "recordings", "--json", "--dir", str(directory.parent)).stdout) == []
 
 
+def test_where_no_recording_is_there_the_command_says_where_it_looked(directory: Path) -> None:
+    empty, nowhere = directory.parent / "empty", directory.parent / "nowhere"
+    empty.mkdir()
+    for where, said in ((empty, f"no complete recording in {empty}"), (nowhere, f"there is no directory {nowhere}")):
+        found = _lockstep(directory, "recordings", "--dir", str(where))
+        assert (found.exit_code, found.stdout) == (0, "")
+        assert found.stderr.strip().endswith(said)
+
+
 def test_a_recording_is_verified_by_its_id_or_its_path(directory: Path) -> None:
     words = _lockstep(directory, "verify", "one")
     assert words.exit_code == 0, words.output

@@ -127,6 +127,9 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
             return
         for entry in found:
             sys.stdout.write(_line(entry) + "\n")
+        if not found:
+            none = "no complete recording in" if store.directory.is_dir() else "there is no directory"
+            _say(f"{none} {escaped(store.directory)}")
 
     @app.command()
     def replay(
