@@ -72,6 +72,26 @@ def test_after_two_silent_seconds_a_robot_that_warns_does_so_again() -> None:
     assert interlock.spell == spell, "said once"
 
 
+def test_a_stick_that_is_held_during_a_long_warning_drives_when_it_ends() -> None:
+    interlock = RestartInterlock(IssueSchedule(50.0), StartWarning(seconds=3 * SILENCE, axis="lamp", value=1.0))
+    interlock.executed(moving=False, spell=interlock.spell, now=0.0)
+    for tick in range(int(3 * SILENCE / 0.02)):
+        interlock.look(0.02 * tick)
+        assert interlock.refuses(0.02 * tick) == "warning"
+    interlock.look(3 * SILENCE)
+    assert interlock.refuses(3 * SILENCE) is None
+
+
+def test_a_stick_that_is_let_go_during_a_long_warning_is_silence() -> None:
+    interlock = RestartInterlock(IssueSchedule(50.0), StartWarning(seconds=3 * SILENCE, axis="lamp", value=1.0))
+    interlock.executed(moving=False, spell=interlock.spell, now=0.0)
+    assert interlock.refuses(1.0) == "warning"
+    interlock.look(1.0 + SILENCE)
+    assert not interlock.needed
+    interlock.look(1.1 + SILENCE)
+    assert interlock.needed
+
+
 def test_whatever_comes_during_the_warning_ends_it() -> None:
     interlock = RestartInterlock(IssueSchedule(), WARNING)
     armed(interlock, 10.0)

@@ -11,7 +11,7 @@ from lockstep.robot_bridge.control.issue_schedule import IssueSchedule
 
 __all__ = ["RestartInterlock"]
 
-SILENCE = 2.0  # s without an executed command after which a robot that warns has to warn again
+SILENCE = 2.0  # s without a command, after which a robot that warns has to warn again
 
 
 class RestartInterlock:
@@ -28,7 +28,8 @@ class RestartInterlock:
         self._needed = True
         self._spell = 1  # counts the causes: a neutral command that was decided before a cause does not clear it
         self._warns_until = -math.inf
-        self._executed_at = math.inf  # s, when a command executed last; infinite while a neutral one is needed
+        # s, when a command executed, or was refused because the robot warns; infinite while a neutral one is needed.
+        self._heard_at = math.inf
 
     @property
     def needed(self) -> bool:
@@ -45,19 +46,25 @@ class RestartInterlock:
         self._needed = True
         self._spell += 1
         self._warns_until = -math.inf
-        self._executed_at = math.inf
+        self._heard_at = math.inf
         self._schedule.want()
 
     def look(self, now: float) -> None:
         """Require a neutral command after `SILENCE`; call before any decision and once a tick."""
-        if self._warning is not None and now - self._executed_at > SILENCE:
+        if self._warning is not None and now - self._heard_at > SILENCE:
             self.require()
 
     def refuses(self, now: float) -> Literal["not_neutral", "warning"] | None:
-        """Return why a moving command may not execute; None if it may."""
+        """Return why a moving command that arrived now may not execute; None if it may.
+
+        One that comes during the warning is no silence: who holds a stick all the while drives when the warning ends.
+        """
         if self._needed:
             return "not_neutral"
-        return "warning" if now < self._warns_until else None
+        if now >= self._warns_until:
+            return None
+        self._heard_at = now
+        return "warning"
 
     def executed(self, *, moving: bool, spell: int, now: float) -> None:
         """Note that a command executed as the answer to an issue of this spell."""
@@ -66,7 +73,7 @@ class RestartInterlock:
             if self._warning is not None:
                 self._warns_until = now + self._warning.seconds
         if not self._needed:
-            self._executed_at = now
+            self._heard_at = now
 
     def warns(self, now: float) -> float:
         """Return the seconds for which the robot still warns; 0 if it does not."""
