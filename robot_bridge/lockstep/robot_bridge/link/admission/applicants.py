@@ -1,26 +1,13 @@
 """Bounds the connections that wait to be admitted, and chooses which of them is ended. No I/O, no clock."""
 
-import ipaddress
 from collections import Counter
 from typing import Generic, TypeVar
 
-__all__ = ["Applicants", "Strangers", "address_group"]
+from lockstep.robot_bridge.link.admission.address_group import address_group
+
+__all__ = ["Applicants", "Strangers"]
 
 Applicant = TypeVar("Applicant")
-PREFIX = 64  # bits of an IPv6 address that one customer has; the same customer has all addresses with them
-
-
-def address_group(address: str) -> str:
-    """Return the group that counts as one address: an IPv4 address, or the /64 of an IPv6 address."""
-    try:
-        parsed = ipaddress.ip_address(address.partition("%")[0])
-    except ValueError:
-        return address
-    if isinstance(parsed, ipaddress.IPv4Address):
-        return str(parsed)
-    if parsed.ipv4_mapped is not None:
-        return str(parsed.ipv4_mapped)
-    return str(ipaddress.ip_network((parsed, PREFIX), strict=False))
 
 
 class Applicants(Generic[Applicant]):
@@ -42,7 +29,7 @@ class Applicants(Generic[Applicant]):
 
     def add(self, applicant: Applicant, address: str) -> Applicant | None:
         """Add an applicant. Return the one that has to go, which is forgotten here; None while there is room."""
-        self._groups[applicant] = address_group(address)
+        self._groups[applicant] = address_group(address) or address
         if len(self._groups) <= self._limit:
             return None
         (most, _), *_ = Counter(self._groups.values()).most_common(1)

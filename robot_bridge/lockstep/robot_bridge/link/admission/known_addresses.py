@@ -7,7 +7,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-from lockstep.robot_bridge.link.admission.applicants import address_group
+from lockstep.robot_bridge.link.admission.address_group import address_group
 
 __all__ = ["KnownAddresses"]
 
@@ -27,11 +27,11 @@ class KnownAddresses:
         self._groups: dict[str, None] = {}  # oldest first
 
     def __contains__(self, address: str) -> bool:
-        return address_group(address) in self._groups
+        return (address_group(address) or address) in self._groups
 
     def add(self, address: str) -> bool:
         """Add an address. True if it was not known."""
-        group = address_group(address)
+        group = address_group(address) or address
         is_new = group not in self._groups
         self._groups.pop(group, None)
         self._groups[group] = None
