@@ -129,10 +129,7 @@ class ActionCore:
 
     def renewed(self, id: str, now: float) -> bool:
         """Note that a neutral command executed which names this action. True if it lets that action go on."""
-        if not id or id != self._moving or self.renewal.is_over(now):
-            return False
-        self.renewal.at = now
-        return True
+        return id != "" and id == self._moving and self.renewal.renew(now)
 
     def look(self, robot: RobotNow) -> list[ActionUpdate]:
         """Cancel the moving action if it must not go on."""

@@ -6,10 +6,11 @@ __all__ = ["Renewal"]
 
 
 class Renewal:
-    """Of the action that moves the robot. One that moves it in a way of its own ends after `hold`.
+    """Decides whether the action that moves the robot goes on, waits at rest, or ends.
 
-    One that drives the axes waits instead, because these are at rest then: it goes on when it is renewed, and ends when
-    that takes as long as `max_event_age`. So it gets there over a path whose round trip takes longer than `hold`.
+    An action that moves the robot in a way of its own ends when it was not renewed for `hold`. One that drives the axes
+    waits then, because the axes are at rest. The next renewal lets it go on. After `max_event_age` it ends too. So an
+    action also ends at its goal where a round trip takes longer than `hold`.
 
     Attributes:
         at: s, when the action began or was renewed last
@@ -25,6 +26,13 @@ class Renewal:
     def begin(self, now: float) -> None:
         """An action begins to move the robot."""
         self.at, self.drives_axes = now, False
+
+    def renew(self, now: float) -> bool:
+        """Renew the action. False if it is too late."""
+        if self.is_over(now):
+            return False
+        self.at = now
+        return True
 
     def waits(self, now: float) -> bool:
         """Return whether the action waits to be renewed, and the axes rest."""

@@ -11,7 +11,8 @@ from lockstep.robot_bridge.control.issue_schedule import IssueSchedule
 
 __all__ = ["RestartInterlock"]
 
-SILENCE = 2.0  # s without a command, after which a robot that warns has to warn again
+# s without a command that executed or was refused because the robot warns; then it has to warn again.
+SILENCE = 2.0
 
 
 class RestartInterlock:
@@ -54,10 +55,11 @@ class RestartInterlock:
         if self._warning is not None and now - self._heard_at > SILENCE:
             self.require()
 
-    def refuses(self, now: float) -> Literal["not_neutral", "warning"] | None:
+    def judge_moving(self, now: float) -> Literal["not_neutral", "warning"] | None:
         """Return why a moving command that arrived now may not execute; None if it may.
 
-        One that comes during the warning is no silence: who holds a stick all the while drives when the warning ends.
+        A command during the warning ends the silence: a person who holds the stick all the while drives when the
+        warning ends.
         """
         if self._needed:
             return "not_neutral"

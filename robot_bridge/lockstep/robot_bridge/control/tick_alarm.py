@@ -30,7 +30,7 @@ class TickAlarm:
         self._rung = False
 
     async def pause(self, seconds: float) -> bool:
-        """Wait for `seconds`, or until the alarm rings. Return False if it has; the next wait ends then, too."""
+        """Wait for `seconds`, or until the alarm rings. Return whether they passed; a ring ends the next wait too."""
         if not self._rung:
             await self._until_rung(seconds)
         return not self._rung

@@ -29,7 +29,7 @@ from lockstep.robot_bridge.watchdog.watchdogs import Watchdogs
 
 __all__ = ["TickLoop"]
 
-GIVE_WAY = 0.002  # s from a feedback until work ahead: whoever is to read it may have to share the processors
+GIVE_WAY = 0.002  # s from a feedback until work ahead, in which the program that reads it gets the processor
 TIMER = 0.001  # s by which a timer may be late
 REST_MARGIN = 0.5  # s on top of hold for the robot to come to rest when the bridge closes
 MAX_CATCH_UP = 3  # ticks made good after the loop was blocked; the rest are skipped
@@ -133,6 +133,8 @@ class TickLoop:
             if not (is_fed_back and self._robot.ticks_on_command) or await self._gave_way(metronome):
                 with _calls_of_the_robot():
                     self._ahead.do()
+            else:
+                self._ahead.leave_out()
 
     async def _gave_way(self, metronome: Ticker) -> bool:
         """Give way to whoever reads the feedback that was sent; return whether there is time for work ahead then."""
@@ -183,7 +185,7 @@ class TickLoop:
 
 @contextlib.contextmanager
 def _calls_of_the_robot() -> Iterator[None]:
-    """Nothing is awaited within: an adapter may raise what ends the loop or cancels the task, and that is its failure.
+    """Turn whatever the adapter raises into `RobotFailed`. Await nothing within: a cancellation would count as one.
 
     Raises:
         RobotFailed: anything was raised.

@@ -7,7 +7,8 @@ from lockstep.robot_bridge.robots.base import Robot
 
 __all__ = ["WorkAhead"]
 
-DEAR = 0.05  # of a tick: what takes longer to measure is measured only when a command asks
+SLOW = 0.1  # of a tick, from which on a measurement is slow
+MOST_SLOW = 10  # slow measurements in a row, after which the robot is measured only when a command asks
 
 
 class WorkAhead:
@@ -22,6 +23,7 @@ class WorkAhead:
         self._robot = robot
         self._measured = measured
         self._measures = robot.ticks_on_command  # for others a command waits for the next tick anyway
+        self._slow = 0  # measurements in a row
 
     def do(self) -> None:
         """Do it now.
@@ -32,7 +34,12 @@ class WorkAhead:
         began = time.perf_counter()
         self._robot.prepare()
         prepared = ended = time.perf_counter()
-        if self._measures and self._measured.measure_ahead():
+        if self._measures and self._slow < MOST_SLOW and self._measured.measure_ahead():
             ended = time.perf_counter()
-            self._measures = ended - prepared < DEAR * self._robot.tick_seconds
+            is_slow = ended - prepared >= SLOW * self._robot.tick_seconds
+            self._slow = self._slow + 1 if is_slow else 0
         self.seconds = ended - began
+
+    def leave_out(self) -> None:
+        """There was no time for it. One call that took long must not keep it out for good."""
+        self.seconds /= 2

@@ -78,7 +78,7 @@ class Clearance:
         reaches = np.array([math.dist(each.start, each.end) / 2 + each.radius for each in capsules.values()])
         self._reaches = reaches[self._columns].sum(axis=0)  # m, of both capsules around their middles
         radii = [each.radius for each in capsules.values()]
-        levers = [self._levers(radii, *pair) for pair in self._columns.T.tolist()]
+        levers = [self._levers(radii, pair) for pair in self._columns.T.tolist()]
         self.levers: Array = np.array(levers).reshape(-1, len(chain.joints))
 
     def gaps(self, state: ChainState, within: float, ahead: Array | None = None) -> list[Gap]:
@@ -101,7 +101,7 @@ class Clearance:
                 widths[number] = min(within, math.dist(here, there) - radii)
         return widths
 
-    def _levers(self, radii: Sequence[float], *pair: int) -> Array:
+    def _levers(self, radii: Sequence[float], pair: Sequence[int]) -> Array:
         near, far = sorted(pair, key=lambda body: self._ends[body][0].moving)
         extent = max(math.hypot(*end.position) for end in self._ends[far]) + radii[far]
         return self._chain.levers(self._ends[near][0].moving, self._ends[far][0].moving, extent)

@@ -97,6 +97,6 @@ def gap_limits(gaps: Sequence[Gap], joints: int, gain: float, close: float) -> G
 
 
 def clipped(values: Array, lowest: Array | float, highest: Array | float) -> Array:
-    """Return values within bounds: a third of the time that `numpy.clip` takes for so few."""
+    """Return values within bounds. `numpy.clip` costs more for a handful of values."""
     within: Array = np.minimum(np.maximum(values, lowest), highest)
     return within

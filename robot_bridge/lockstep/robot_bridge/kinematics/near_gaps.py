@@ -21,7 +21,7 @@ AGAIN: Final = 0.02  # m that one must have changed by at most, before they are 
 
 
 class NearGaps:
-    """Asks sources for their gaps. What it remembers changes no gap that joints change, only how soon it is known."""
+    """Returns what asking every source each time would return, but for gaps that no joint changes."""
 
     def __init__(self, sources: Sequence[GapSource]) -> None:
         self._sources = tuple(sources)

@@ -119,9 +119,8 @@ class Robot(ABC):
     def prepare(self) -> None:
         """Compute what the next `apply` and `tick` can use, whatever their values are, so that they take less time.
 
-        Called after a tick while the bridge runs. Where a robot that `ticks_on_command` has sent a feedback, it is
-        called up to 2 ms later, so that others can read that first, and left out where the next tick comes before. It
-        must change nothing that the robot does.
+        Called after a tick while the bridge runs. With `ticks_on_command`, after a tick that sent a feedback, it is
+        called up to 2 ms later, or not at all if the next tick comes first. It must change nothing that the robot does.
         """
 
     @abstractmethod
@@ -131,9 +130,9 @@ class Robot(ABC):
     def measured_axes(self) -> Sequence[float]:
         """Return the measured value of each axis now, as in `measure`; NaN if unknown or too old to be trusted.
 
-        Called when the bridge starts, when a stop was reset, and for commands with goals, or ahead of them where that
-        takes a twentieth of a tick at most; once between two ticks. `reach` bounds the distance of goals from here. So
-        it should cost little. Needed only for goal axes.
+        Called when the bridge starts, when a stop was reset, and for commands with goals, at most once between two
+        ticks. With `ticks_on_command` the bridge may call it ahead of the command, if it is fast enough. `reach` bounds
+        the distance of goals from here. Needed only for goal axes.
         """
         return self.measure().axes
 

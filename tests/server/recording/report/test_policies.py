@@ -79,7 +79,7 @@ def test_a_session_tells_outcomes_and_interventions_of_episodes_as_they_were_cha
     text = plain(session_page(path))
     assert re.search(r"Ada 0 1 0 0 % .*policy net corrected 1 0 0 100 %", text)
     assert "policy net alone" not in text
-    assert "episodes in which a policy drove: 51.72 a minute." in text, "of 1.6 and 0.72 s"
+    assert "1 interventions in 0.0 minutes of episodes in which a policy drove: 25.86 a minute." in text, "in 2.32 s"
 
 
 def test_a_session_of_people_alone_has_no_such_section(tmp_path: Path) -> None:

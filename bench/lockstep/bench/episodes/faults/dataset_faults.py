@@ -17,7 +17,7 @@ from lockstep.client import RecordedEpisodes
 
 __all__ = ["LOW_BYTES", "discard_late", "fill_disk", "kill_export", "leave_free"]
 
-TRIES: Final = 10
+TRIES: Final = 10  # to fill a disk to which others write
 LOW_BYTES: Final = 8 << 20  # that are to stay free on the disk
 
 
@@ -59,16 +59,15 @@ def leave_free(ballast: Path, left: int) -> None:
     Raises:
         OSError: they took what was to be left every time.
     """
-    for again in reversed(range(TRIES)):
-        free = shutil.disk_usage(ballast.parent).free
-        try:
-            with ballast.open("wb") as file:
+    for attempt in range(1, TRIES + 1):
+        with ballast.open("wb") as file:
+            free = shutil.disk_usage(ballast.parent).free
+            try:
                 os.posix_fallocate(file.fileno(), 0, max(1, free - left))
-        except OSError as error:
-            if error.errno != errno.ENOSPC or not again:
-                raise
-        else:
-            return
+                return
+            except OSError as error:
+                if error.errno != errno.ENOSPC or attempt == TRIES:
+                    raise
 
 
 async def discard_late(run: FaultRun) -> None:

@@ -1,1 +1,1 @@
-"""Who may connect to the bridge: connections taken from the socket, bounded by address, judged before they are one."""
+"""Admission: accepts connections, limits them by address, and decides which become links."""

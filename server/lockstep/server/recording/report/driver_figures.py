@@ -11,6 +11,7 @@ from bisect import bisect_right
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from lockstep.protocol.console import DriverKind
 from lockstep.protocol.episodes import EpisodeOutcome
@@ -75,6 +76,7 @@ class DriverTally:
         outcomes: of kept episodes, by who drove them: "policy net alone", "policy net corrected", "Ada"
         shadows: by name of the policy
         policy_seconds: of the kept and discarded episodes in which a policy drove
+        interventions: spells, in these episodes
     """
 
     def __init__(self) -> None:
@@ -82,20 +84,18 @@ class DriverTally:
         self.outcomes: dict[str, Outcomes] = {}
         self.shadows: dict[str, Shadowed] = {}
         self.policy_seconds = 0.0
+        self.interventions = 0
         self._reader = RecordedDrivers()
         self._event: tuple[str, int] = ("", 0)
         self._time = 0.0  # s, of the bridge, of the newest event
         self._before = NOBODY  # the newest event's driver
-        self._events: list[tuple[int, float, EventDriver]] = []  # of this part: event, s, and its driver
+        # Of this part: event, s, and its driver. A part has a bound, `LOCKSTEP_RECORDING__FILE_BYTES`.
+        self._events: list[tuple[int, float, EventDriver]] = []
 
     @property
     def has_policy(self) -> bool:
         """Whether a policy drove or shadowed."""
         return bool(self.shadows) or any(kind == "policy" for _, kind in self.drivers)
-
-    @property
-    def interventions(self) -> int:
-        return sum(each.interventions for each in self.drivers.values())
 
     @property
     def interventions_per_minute(self) -> float | None:
@@ -151,6 +151,8 @@ class DriverTally:
         policies = sorted({each.name for each in drivers if each.kind == "policy"})
         if policies:
             self.policy_seconds += sum(seconds for _, seconds, _ in events)
+            spells = pairwise([NOBODY, *(driver for _, _, driver in events)])
+            self.interventions += sum(now.intervention and now != before for before, now in spells)
         if is_kept and drivers:
             who = _who(drivers, policies)
             if who in self.outcomes or len(self.outcomes) < MOST:
