@@ -8,6 +8,7 @@ from lockstep.protocol.actions import Act, ActionUpdate
 from lockstep.protocol.description import Action, ActionParameter
 from lockstep.protocol.messages import StopState
 from lockstep.robot_bridge.actions.action_core import ActionCore, Begun, RobotNow
+from lockstep.robot_bridge.actions.renewal import LONGEST
 from lockstep.robot_bridge.actions.request_outcomes import MAX_REMEMBERED
 
 HOLD = 0.3
@@ -137,10 +138,10 @@ def test_a_renewal_that_comes_after_hold_is_too_late() -> None:
     assert reasons(core.look(robot(HOLD))) == ["cancelled not_renewed"]
 
 
-def test_an_action_that_drives_the_axes_waits_for_its_renewal_and_ends_when_none_can_be_in_time() -> None:
+def test_an_action_that_waits_goes_on_with_its_renewal_and_ends_after_two_seconds_without_one() -> None:
     core = fresh()
     ask(core, act())
-    core.renewal.drives_axes = True
+    core.renewal.let_wait()
     assert not core.renewal.waits(HOLD - 0.001)
     assert core.renewal.waits(HOLD)
     now = 0.0
@@ -149,24 +150,16 @@ def test_an_action_that_drives_the_axes_waits_for_its_renewal_and_ends_when_none
         assert core.look(robot(now)) == []
         assert core.renewed("a", now)
         assert not core.renewal.waits(now)
-    assert core.look(robot(now + AGE - 0.001)) == []
-    assert reasons(core.look(robot(now + AGE))) == ["cancelled not_renewed"]
-    assert not core.renewed("a", now + AGE)
+    assert core.look(robot(now + LONGEST - 0.001)) == []
+    assert reasons(core.look(robot(now + LONGEST))) == ["cancelled not_renewed"]
+    assert not core.renewed("a", now + LONGEST)
     assert core.moving == ""
 
 
-def test_an_action_that_moves_the_robot_in_its_own_way_from_some_step_on_does_not_wait() -> None:
+def test_an_action_that_begins_does_not_wait_because_one_before_it_did() -> None:
     core = fresh()
     ask(core, act())
-    core.renewal.drives_axes = True
-    core.renewal.drives_axes = False
-    assert reasons(core.look(robot(HOLD))) == ["cancelled not_renewed"]
-
-
-def test_an_action_that_begins_is_none_that_waits_because_one_before_it_drove_the_axes() -> None:
-    core = fresh()
-    ask(core, act())
-    core.renewal.drives_axes = True
+    core.renewal.let_wait()
     core.finish("a", "done", 8)
     assert ask(core, act("dock", "b")) == "running"
     assert not core.renewal.waits(HOLD)
@@ -184,7 +177,7 @@ def test_an_action_that_begins_is_none_that_waits_because_one_before_it_drove_th
 def test_what_ends_an_action_ends_one_that_waits(state: RobotNow, reason: str) -> None:
     core = fresh()
     ask(core, act())
-    core.renewal.drives_axes = True
+    core.renewal.let_wait()
     assert core.renewal.waits(2 * HOLD)
     assert reasons(core.look(state)) == [f"cancelled {reason}"]
     assert not core.renewed("a", 2 * HOLD)

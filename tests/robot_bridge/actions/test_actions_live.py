@@ -12,6 +12,7 @@ import pytest
 from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, ParameterValue, Status, StatusItem
 from lockstep.protocol.description import Action, RobotDescription
 from lockstep.protocol.messages import Feedback, Rest, Stop
+from lockstep.robot_bridge.actions.renewal import LONGEST
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.errors import RobotFailed
 from lockstep.robot_bridge.link.link_client import RobotLink
@@ -202,6 +203,33 @@ async def test_over_a_path_that_takes_longer_than_hold_home_goes_on_with_each_re
     renewed = [cast(float, line["time"]) for kind in ("action", "executed") for line in log_lines(log, kind)]
     for when, values in robot.applied:
         assert values == NEUTRAL or any(each - MARGIN < when < each + hold + MARGIN for each in renewed)
+
+
+class Mixed(OwnMotion):
+    """Moves something in its own way beside the axes."""
+
+    def step(self) -> ActionStep:
+        super().step()
+        return ActionStep(0.5, values=NEUTRAL)
+
+
+class MixedRobot(OwnWayRobot):
+    def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
+        return Mixed(self)
+
+
+async def test_an_action_that_does_not_say_that_it_waits_is_cancelled_at_hold_whatever_its_steps_are(
+    tmp_path: Path,
+) -> None:
+    robot, log = MixedRobot(), tmp_path / "events.jsonl"
+    async with running_bridge(robot, event_log=log) as bridge, operator(bridge) as driver:
+        await ask(driver, "dock")
+        final = await until_final(driver)
+        assert (final.state, final.reason) == ("cancelled", "not_renewed")
+        hold = bridge.description.hold
+    began, ended = (cast(float, line["time"]) for line in log_lines(log, "action"))
+    assert hold <= ended - began < LONGEST, "as soon as the ticks allow"
+    assert robot.calls.count("cancel") == 1
 
 
 async def stick(driver: Operator) -> None:

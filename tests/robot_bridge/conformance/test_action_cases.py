@@ -36,7 +36,7 @@ async def results_of(*names: str) -> dict[str, Result]:
 
 async def test_the_bridge_passes() -> None:
     results = await results_of(*(case.name for case in ABOUT_ACTIONS))
-    assert len(results) == 9
+    assert len(results) == 10
     assert {name: result.detail for name, result in results.items() if result.outcome is not Outcome.OK} == {}
 
 
@@ -54,9 +54,22 @@ def all_but(reason: ActionReason) -> Callable[[ActionRunner, ActionReason], None
     return deaf
 
 
+def deaf_while_it_waits(runner: ActionRunner, why: ActionReason) -> None:
+    if not runner.waits:
+        INTERRUPT(runner, why)
+
+
+def wakes_by_itself(runner: ActionRunner) -> None:
+    STEP(runner)
+    if runner.waits and runner._now() - runner._core.renewal.at > 1.2:
+        runner._core.renewal.at = runner._now()
+
+
+INTERRUPT, STEP = ActionRunner.interrupt, ActionRunner.step
 FAULTS: dict[str, tuple[type, str, object]] = {
     "action_hold": (ActionCore, "look", nothing),
     "action_stop": (ActionCore, "look", nothing),
+    "action_waits": (ActionRunner, "interrupt", deaf_while_it_waits),
     "action_stick": (ActionRunner, "interrupt", all_but("driving")),
     "action_rest": (ActionRunner, "interrupt", all_but("rested")),
     "action_renewed": (ActionCore, "renewed", lambda *_: False),
@@ -74,3 +87,10 @@ async def test_a_planted_fault_is_found_by_the_case_that_is_about_it(
     monkeypatch.setattr(kind, method, fault)
     result = (await results_of(name))[name]
     assert result.outcome is Outcome.FAILED, result
+
+
+async def test_an_action_that_goes_on_by_itself_after_it_has_waited_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ActionRunner, "step", wakes_by_itself)
+    result = (await results_of("action_hold"))["action_hold"]
+    assert result.outcome is Outcome.FAILED, result
+    assert "moves again" in result.detail

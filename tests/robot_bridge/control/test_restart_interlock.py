@@ -11,9 +11,9 @@ def armed(interlock: RestartInterlock, now: float) -> None:
 
 def test_nothing_moves_before_the_first_neutral_command() -> None:
     interlock = RestartInterlock(IssueSchedule())
-    assert interlock.judge_moving(1.0) == "not_neutral"
+    assert interlock.judge_moving(1.0, 1.0) == "not_neutral"
     armed(interlock, 1.0)
-    assert interlock.judge_moving(1.0) is None
+    assert interlock.judge_moving(1.0, 1.0) is None
     assert not interlock.needed
 
 
@@ -22,7 +22,7 @@ def test_a_neutral_command_of_an_earlier_spell_clears_nothing() -> None:
     earlier = interlock.spell
     interlock.require()
     interlock.executed(moving=False, spell=earlier, now=1.0)
-    assert interlock.judge_moving(1.0) == "not_neutral"
+    assert interlock.judge_moving(1.0, 1.0) == "not_neutral"
 
 
 def test_each_cause_wants_a_feedback_that_tells_it() -> None:
@@ -47,8 +47,8 @@ def test_a_robot_that_warns_refuses_motion_for_its_seconds_and_says_how_much_is_
     assert interlock.warns(10.0) == 0, "nobody has armed"
     armed(interlock, 10.0)
     assert interlock.warns(10.5) == 1.0
-    assert interlock.judge_moving(11.499) == "warning"
-    assert interlock.judge_moving(11.5) is None
+    assert interlock.judge_moving(11.499, 11.499) == "warning"
+    assert interlock.judge_moving(11.5, 11.5) is None
     assert interlock.warns(12.0) == 0
 
 
@@ -56,7 +56,7 @@ def test_further_neutral_commands_neither_lengthen_nor_shorten_the_warning() -> 
     interlock = RestartInterlock(IssueSchedule(), WARNING)
     armed(interlock, 10.0)
     armed(interlock, 11.0)
-    assert interlock.judge_moving(11.5) is None
+    assert interlock.judge_moving(11.5, 11.5) is None
 
 
 def test_after_two_silent_seconds_a_robot_that_warns_does_so_again() -> None:
@@ -66,7 +66,7 @@ def test_after_two_silent_seconds_a_robot_that_warns_does_so_again() -> None:
     interlock.look(11.6 + SILENCE)
     assert not interlock.needed
     interlock.look(11.7 + SILENCE)
-    assert interlock.judge_moving(11.7 + SILENCE) == "not_neutral"
+    assert interlock.judge_moving(11.7 + SILENCE, 11.7 + SILENCE) == "not_neutral"
     spell = interlock.spell
     interlock.look(100.0)
     assert interlock.spell == spell, "said once"
@@ -77,15 +77,24 @@ def test_a_stick_that_is_held_during_a_long_warning_drives_when_it_ends() -> Non
     interlock.executed(moving=False, spell=interlock.spell, now=0.0)
     for tick in range(int(3 * SILENCE / 0.02)):
         interlock.look(0.02 * tick)
-        assert interlock.judge_moving(0.02 * tick) == "warning"
+        assert interlock.judge_moving(0.02 * tick, 0.02 * tick) == "warning"
     interlock.look(3 * SILENCE)
-    assert interlock.judge_moving(3 * SILENCE) is None
+    assert interlock.judge_moving(3 * SILENCE, 3 * SILENCE) is None
+
+
+def test_copies_of_a_command_that_the_warning_refused_are_no_further_commands() -> None:
+    interlock = RestartInterlock(IssueSchedule(50.0), StartWarning(seconds=3 * SILENCE, axis="lamp", value=1.0))
+    interlock.executed(moving=False, spell=interlock.spell, now=0.0)
+    for copy in range(5):
+        assert interlock.judge_moving(0.1, 0.2 + 0.3 * copy) == "warning"
+    interlock.look(0.2 + SILENCE)
+    assert interlock.needed
 
 
 def test_a_stick_that_is_let_go_during_a_long_warning_is_silence() -> None:
     interlock = RestartInterlock(IssueSchedule(50.0), StartWarning(seconds=3 * SILENCE, axis="lamp", value=1.0))
     interlock.executed(moving=False, spell=interlock.spell, now=0.0)
-    assert interlock.judge_moving(1.0) == "warning"
+    assert interlock.judge_moving(1.0, 1.0) == "warning"
     interlock.look(1.0 + SILENCE)
     assert not interlock.needed
     interlock.look(1.1 + SILENCE)
@@ -97,4 +106,4 @@ def test_whatever_comes_during_the_warning_ends_it() -> None:
     armed(interlock, 10.0)
     interlock.require()
     assert interlock.warns(10.1) == 0
-    assert interlock.judge_moving(12.0) == "not_neutral"
+    assert interlock.judge_moving(12.0, 12.0) == "not_neutral"

@@ -62,7 +62,7 @@ class ActionCore:
 
     def __init__(self, actions: Sequence[Action], *, hold: float, max_event_age: float) -> None:
         self._actions = {action.name: action for action in actions}
-        self.renewal = Renewal(hold, max_event_age)
+        self.renewal = Renewal(hold)
         self.outcomes = RequestOutcomes(max_event_age)
         self._feedback = RecentFeedback(max_event_age)
         self._running: dict[str, float] = {}  # ids that run -> s, when their progress was told last

@@ -71,7 +71,7 @@ class ActionRunner:
             self._reports.tell(outcome.update, is_new=outcome.update.state == "refused")
             return
         try:
-            self._runs[act.id] = self._robot.begin_action(outcome.action.name, outcome.parameters)
+            run = self._runs[act.id] = self._robot.begin_action(outcome.action.name, outcome.parameters)
         except ActionNotPossible as error:
             why = str(error)
             self._reports.tell(
@@ -81,6 +81,8 @@ class ActionRunner:
             self._error = error
             self._reports.tell(self._core.finish(act.id, "failed", self._events.current))
         else:
+            if act.id == self._core.moving and run.waits:
+                self._core.renewal.let_wait()
             self._reports.tell(outcome.update)
 
     def cancel(self, message: ActionCancel) -> None:
@@ -134,8 +136,6 @@ class ActionRunner:
             return
         robot = robot_now(self._events, self._shaper, self._now())
         self._reports.tell(self._core.progress(id, step.progress, step.text, robot), is_new=False)
-        if id == self._core.moving:
-            self._core.renewal.drives_axes = step.values is not None
         if step.values is not None:
             if id != self._core.moving:
                 raise ValueError("an action that is not declared to move drives axes")

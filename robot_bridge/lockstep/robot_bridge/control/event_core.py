@@ -153,7 +153,7 @@ class EventCore:
         if moving and self._rested is not None and not is_newer(command.event, self._rested):
             return self._refuse(command, "rested")
         self.interlock.look(now)
-        if moving and (reason := self.interlock.judge_moving(now)) is not None:
+        if moving and (reason := self.interlock.judge_moving(issued.time, now)) is not None:
             return self._refuse(command, reason)
         if moving and (far := self.values.jump(command.values)):  # last: it measures the robot
             return self._refuse(command, "jump", far)

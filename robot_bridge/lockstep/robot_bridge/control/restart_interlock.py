@@ -55,17 +55,17 @@ class RestartInterlock:
         if self._warning is not None and now - self._heard_at > SILENCE:
             self.require()
 
-    def judge_moving(self, now: float) -> Literal["not_neutral", "warning"] | None:
+    def judge_moving(self, issued: float, now: float) -> Literal["not_neutral", "warning"] | None:
         """Return why a moving command that arrived now may not execute; None if it may.
 
-        A command during the warning ends the silence: a person who holds the stick all the while drives when the
-        warning ends.
+        `issued`: s, when the feedback was issued that it answers. A command during the warning ends the silence then,
+        and not when one of its copies comes: a person who holds the stick all the while drives when the warning ends.
         """
         if self._needed:
             return "not_neutral"
         if now >= self._warns_until:
             return None
-        self._heard_at = now
+        self._heard_at = max(self._heard_at, issued)
         return "warning"
 
     def executed(self, *, moving: bool, spell: int, now: float) -> None:

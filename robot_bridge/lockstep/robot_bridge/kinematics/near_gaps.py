@@ -32,6 +32,7 @@ class NearGaps:
         self._seen: Array | None = None  # rad, joint positions at which the distances were looked up
         self._within = 0.0  # m, what was narrow then
         self._spare = np.zeros(len(self._levers))  # m, from there to each distance
+        self._narrowest = 0  # number of that distance
 
     def gaps(self, joints: Array, state: ChainState, within: float, ahead: Array | None = None) -> list[Gap]:
         """Return the gaps that are narrower than `within` (m), or become so by the motion `ahead` of the joints.
@@ -46,14 +47,28 @@ class NearGaps:
 
     def _are_wide(self, joints: Array, state: ChainState, within: float, ahead: Array | None) -> bool:
         """Return whether no distance can be narrow, by what it was and how far the joints are from there."""
-        soon = 0.0 if ahead is None else self._levers @ np.abs(ahead)
+        motion = None if ahead is None else np.abs(ahead)
         if self._seen is not None and within == self._within:
-            change = self._levers @ np.abs(joints - self._seen)
-            if (change + soon < self._spare).all():
+            moved = np.abs(joints - self._seen)
+            if self._is_narrow_still(moved, motion):
+                return False
+            change = self._levers @ moved
+            if (change + self._soon(motion) < self._spare).all():
                 return True
             if change.max() < AGAIN:
                 return False
         self._seen, self._within = joints.copy(), within
         widths = np.concatenate([source.widths(state, within + FURTHER) for source in self._sources])
         self._spare = widths[self._change] - within
-        return bool((soon < self._spare).all())
+        self._narrowest = int(self._spare.argmin())
+        return bool((self._soon(motion) < self._spare).all())
+
+    def _soon(self, motion: Array | None) -> Array | float:
+        """Return by how much each distance may become narrower by a motion ahead, m."""
+        return 0.0 if motion is None else self._levers @ motion
+
+    def _is_narrow_still(self, moved: Array, motion: Array | None) -> bool:
+        """Return whether the narrowest distance cannot have become wide. The usual case close by, so it is quick."""
+        levers = self._levers[self._narrowest]
+        soon = 0.0 if motion is None else levers @ motion
+        return bool(self._spare[self._narrowest] + levers @ moved <= soon)

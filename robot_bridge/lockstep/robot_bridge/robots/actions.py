@@ -28,13 +28,18 @@ class ActionStep(NamedTuple):
 
 
 class ActionRun(ABC):
-    """One run of an action. Both methods are called from the bridge's event loop and must return at once."""
+    """One run of an action. Both methods are called from the bridge's event loop and must return at once.
+
+    With `waits` the run moves nothing but the axes, by the values of its steps, and each step begins from where the
+    robot is. Then the bridge does not cancel it when it was not renewed for `hold`: the axes are at rest, `step` is not
+    called, and the next renewal lets it go on. That takes 2 s at most. Any other run is cancelled after `hold`.
+    """
+
+    waits: bool = False
 
     @abstractmethod
     def step(self) -> ActionStep:
-        """Do the next part of the action. Called once a tick, before `apply`.
-
-        Not called while an action that drives the axes waits to be renewed: the axes are at rest then.
+        """Do the next part of the action. Called once a tick, before `apply`; not while it waits to be renewed.
 
         Raises:
             ActionFailed: the action did not work.

@@ -22,6 +22,8 @@ class GoTo(ActionRun):
     What a gripper holds may keep it from its goal: the action is done without it if the others are there.
     """
 
+    waits = True
+
     def __init__(
         self,
         goals: Mapping[int, float],

@@ -20,6 +20,7 @@ from lockstep.robot_bridge.conformance.waiting import PATIENCE, SETTLE, within
 __all__ = ["ACTION_CASES"]
 
 HOLDS = 2  # times `hold` for which an action is renewed, beyond what it might wait for a renewal
+LONGEST_WAIT = 2.0  # s for which an action may wait to be renewed
 TRIES = 5  # attempts where a busy machine holds up this program or the bridge
 HELD_UP = 1.5  # times `hold`: a motion that ended unrenewed so late is tried again
 ASKING = ("late", "too_often", "not_possible", "busy")  # refusals after which a case cannot be tried
@@ -155,7 +156,7 @@ async def _hold(subject: Subject) -> None:
         said = await _unrenewed(driver, act, began + hold + SETTLE)
         expect(driver.feedback.at_rest, f"the action goes on: the robot moves when it was not renewed for {hold:g} s")
         if said.state == "running":  # it may wait to be renewed, but not for ever
-            said = await _unrenewed(driver, act, began + _longest_wait(driver) + SETTLE)
+            said = await _unrenewed(driver, act, began + _longest_wait(driver) + SETTLE, rests=True)
         expect(said.state != "running", "the action goes on; it had to end: not_renewed")
         needs(said.state == "cancelled", f"the action was {said.state} before it had to be cancelled")
         expect(said.reason == "not_renewed", f"cancelled {said.reason!r}, not 'not_renewed'")
@@ -166,11 +167,38 @@ async def _hold(subject: Subject) -> None:
 
 def _longest_wait(driver: Driver) -> float:
     """Return after how many s without a renewal an action has to be cancelled."""
-    return max(driver.description.hold, driver.description.max_event_age)
+    return max(driver.description.hold, LONGEST_WAIT)
 
 
-async def _unrenewed(driver: Driver, act: Act, until: float) -> ActionUpdate:
-    """Send neutral commands that name no action until the robot's clock says so; return what became of the action."""
+async def _waiting(subject: Subject) -> None:
+    async with subject.operator() as driver:
+
+        def moving() -> Command:
+            return driver.command(driver.moving())
+
+        def rest() -> Rest:
+            return Rest(event=event_after(driver.feedback.event))
+
+        longest = driver.description.hold + SETTLE
+        for reason, interrupt in (("driving", moving), ("rested", rest)):
+            act = await _begun(driver)
+            said = await _unrenewed(driver, act, driver.feedback.time + longest)
+            needs(said.state == "running", "no action of the robot waits to be renewed")
+            driver.peer.send(interrupt())
+            said = await _unrenewed(driver, act, driver.feedback.time + longest)
+            found = f"{said.state} {said.reason}".rstrip()
+            expect(
+                found == f"cancelled {reason}", f"an action that waits is {found}; it had to be cancelled {reason!r}"
+            )
+            await _calmed(driver)
+
+
+async def _unrenewed(driver: Driver, act: Act, until: float, *, rests: bool = False) -> ActionUpdate:
+    """Send neutral commands that name no action until the robot's clock says so; return what became of the action.
+
+    `rests`: the robot has to be at rest all the while.
+    """
+    pause = 1 / driver.description.max_event_rate
     newest = ActionUpdate(id=act.id, name=act.name, state="running", event=driver.feedback.event)
     async with within(until - driver.feedback.time + PATIENCE, "neutral commands are not answered"):
         while driver.feedback.time < until:
@@ -178,6 +206,11 @@ async def _unrenewed(driver: Driver, act: Act, until: float) -> ActionUpdate:
             while not isinstance(said := await driver.next(), Feedback | Refusal):
                 if isinstance(said, ActionUpdate) and said.id == act.id:
                     newest = said
+            expect(
+                driver.feedback.at_rest or not rests,
+                "the action goes on: the robot moves again, and nothing renewed it",
+            )
+            await asyncio.sleep(pause)
     return newest
 
 
@@ -247,6 +280,7 @@ ACTION_CASES: tuple[Case, ...] = (
         "What moves the robot",
         _hold,
     ),
+    Case("action_waits", "a moving command and a rest cancel a motion that waits", "What moves the robot", _waiting),
     Case("action_renewed", "a motion goes on while armed events name it", "What moves the robot", _renewed),
     Case("action_stick", "a moving command cancels a motion", "What moves the robot", _stick),
     Case("action_rest", "a rest cancels a motion", "What moves the robot", _rest),

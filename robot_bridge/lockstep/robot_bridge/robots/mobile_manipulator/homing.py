@@ -30,6 +30,8 @@ class Homing(ActionRun):
     The servos' lead bounds the push of an arm that is blocked, as it does while driving.
     """
 
+    waits = True
+
     def __init__(self, arm: HomingArm, tick: float) -> None:
         """`tick`: s between two steps."""
         self._arm = arm

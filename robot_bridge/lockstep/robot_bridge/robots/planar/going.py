@@ -24,6 +24,8 @@ NEARER: Final = 0.005  # m
 class Going(ActionRun):
     """Drives the axes along the way to a pose."""
 
+    waits = True
+
     def __init__(
         self,
         pose: Callable[[], PlanarPose],

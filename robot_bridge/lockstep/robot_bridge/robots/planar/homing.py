@@ -20,6 +20,8 @@ Pose = tuple[float, float, float]  # x and y in m, yaw in rad
 class Homing(ActionRun):
     """Drives the axes straight to a pose. Walls and geofences may be in the way; then it gives up."""
 
+    waits = True
+
     def __init__(self, pose: Callable[[], Pose], home: Pose, *, speed: float, turn: float, tick: float) -> None:
         """`speed`, `turn`: the fastest that it drives, m/s and rad/s. `tick`: s between two steps."""
         self._pose = pose

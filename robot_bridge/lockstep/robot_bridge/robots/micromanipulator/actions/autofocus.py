@@ -20,6 +20,8 @@ class Autofocus(ActionRun):
     It drives the axis of the focus, so the range of the focus bounds it as it bounds a stick.
     """
 
+    waits = True
+
     def __init__(
         self,
         focus: Callable[[], float],

@@ -47,6 +47,8 @@ class ShownPictures:
 class Centring(ActionRun):
     """Drives two axes in a straight line to a place. The bridge's limits bound it as they bound a stick."""
 
+    waits = True
+
     def __init__(
         self,
         place: Callable[[], tuple[float, ...]],
