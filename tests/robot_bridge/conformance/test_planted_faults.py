@@ -114,6 +114,7 @@ async def test_a_bridge_written_from_the_page_passes_and_with_a_fault_fails_in_t
     assert {result.case.name: result.detail for result in passing if result.outcome is not Outcome.OK} == {
         "secret": "no link secret was given",
         "warning": "the description has no start_warning",
+        "action_waits": "no action of the robot waits to be renewed",
         **dict.fromkeys(GOALS, "the description has no goal axes"),
     }
     for (fault, others), results in zip(MET_BY_OTHERS.items(), found, strict=True):
