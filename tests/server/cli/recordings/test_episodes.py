@@ -45,7 +45,7 @@ def test_the_episodes_of_a_recording_are_listed_and_one_is_relabelled(directory:
     [
         (("--edit", "b", "--undrop"), "no kept episode"),
         (("--edit", "a", "--last", "99"), "stays within"),
-        (("--edit", "a", "--outcome", "good"), "success, failure or none"),
+        (("--edit", "a", "--outcome", "good"), "'good' is not one of"),
         (("--edit", "a", "--first", "-3"), ""),
     ],
 )
@@ -56,6 +56,60 @@ def test_what_cannot_be_changed_is_said_with_exit_code_2(
     assert found.exit_code == 2
     assert words in found.stderr
     assert sorted(each.name for each in directory.iterdir()) == ["one.mcap", "two.mcap"]
+
+
+def test_the_episodes_of_all_recordings_are_listed_and_chosen_by_what_they_are(directory: Path) -> None:
+    (directory / "broken.mcap").write_bytes(b"no recording")
+    _lockstep(directory, "episodes", "two", "--edit", "c", "--outcome", "success")
+    words = _lockstep(directory, "episodes")
+    assert words.exit_code == 0, words.output
+    assert [line for line in words.stdout.splitlines() if not line.startswith(" ")] == ["one", "two"]
+    assert len(words.stdout.splitlines()) == 12
+
+    def ids(*arguments: str) -> list[tuple[str, list[str]]]:
+        found = json.loads(_lockstep(directory, "episodes", *arguments, "--json").stdout)
+        return [(each["info"]["id"], [episode["id"] for episode in each["episodes"]]) for each in found]
+
+    assert ids("--only-state", "kept", "--only-state", "cut") == [("one", ["a", "c", "d"]), ("two", ["a", "c", "d"])]
+    assert ids("--only-outcome", "success") == [("one", ["a"]), ("two", ["a", "c"])]
+    assert ids("--only-task", "wipe", "--only-outcome", "success") == [("two", ["c"])]
+    assert ids("--only-outcome", "none", "--only-state", "open", "--only-without-problems") == [
+        ("one", ["e"]),
+        ("two", ["e"]),
+    ]
+    assert ids("--only-driver", "Nobody") == []
+    assert "no such episode in" in _lockstep(directory, "episodes", "--only-driver", "Nobody").stderr
+    one = json.loads(_lockstep(directory, "episodes", "one", "--only-task", "wipe", "--json").stdout)
+    assert [each["id"] for each in one] == ["c"]
+
+
+def test_a_choice_does_not_say_which_episode_to_change(directory: Path) -> None:
+    for arguments, words in (
+        (("one", "--edit", "a", "--only-task", "wipe", "--task", "x"), "--edit names the episode to change"),
+        (("--edit", "a", "--task", "x"), "name the recording"),
+        (("--changes",), "name the recording"),
+    ):
+        found = _lockstep(directory, "episodes", *arguments)
+        assert (found.exit_code, words in found.stderr) == (2, True), found.stderr
+    assert not list(directory.glob("*.jsonl"))
+
+
+def test_a_dataset_is_made_of_the_chosen_episodes_and_keeps_its_options(directory: Path, tmp_path: Path) -> None:
+    command = ("export", "one", "two", "--to", "lerobot", "--out", str(tmp_path / "dataset"))
+    done = _lockstep(directory, *command, "--append", "--only-outcome", "failure")
+    assert done.exit_code == 0, done.output
+    assert "episode a of one.mcap is left out: its outcome is success" in done.stdout
+    assert _lockstep(directory, "verify", str(tmp_path / "dataset")).stdout.startswith("1 episodes, 15 rows")
+    for arguments, words in (
+        (("--append", "--tolerance", "2"), "a tolerance of 4 and not 2 events"),
+        (("--follow", "--fps", "10"), "each event as a row and not 10 rows a second"),
+        (("--append", "--only-outcome", "success"), "not those that --only-… chooses now"),
+    ):
+        found = _lockstep(directory, *command, *arguments)
+        assert (found.exit_code, words in found.stderr) == (2, True), found.output
+    assert _lockstep(directory, *command, "--append").exit_code == 0
+    found = _lockstep(directory, "export", "one", "--to", "csv", "--only-task", "push")
+    assert (found.exit_code, "are for lerobot alone" in found.stderr) == (2, True), found.stderr
 
 
 def test_an_episode_is_split_its_parts_are_changed_and_all_of_it_is_taken_back(directory: Path) -> None:

@@ -3,6 +3,7 @@
 import asyncio
 import os
 import random
+import re
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from pathlib import Path
@@ -17,14 +18,16 @@ from lockstep.server.recording.dataset import appending
 from lockstep.server.recording.dataset.appending import alone_with, read_state
 from lockstep.server.recording.dataset.commit import STAGE, commit, recover, stage_of
 from lockstep.server.recording.dataset.follower import DatasetFollower
-from lockstep.server.recording.errors import DatasetRefused
+from lockstep.server.recording.episodes.episode_filter import EpisodeFilter
+from lockstep.server.recording.errors import DatasetRefused, RecordingDamaged
 from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.export.export_lerobot import DatasetOptions
+from lockstep.server.recording.export.lerobot_layout import LayoutChoice
 from lockstep.server.recording.format.records import Degraded
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from tests.server.recording.dataset.growing_file import GrowingFile
 from tests.server.recording.makers import EPOCH, INTERVAL, START, own_entry
-from tests.server.recording.test_episode_export import KEPT_AND_NOT, changed, episode, recording
+from tests.server.recording.test_episode_export import KEPT_AND_NOT, OTHER, changed, episode, recording
 
 FILES = 7  # of an append to a dataset with one camera
 STEPS = FILES + 1
@@ -105,6 +108,82 @@ def test_a_change_before_the_append_counts_and_a_later_one_does_not(tmp_path: Pa
         "episode a of a.mcap is left out: the dataset has 8 of its 10 events already, as a, from before a change",
         "0 appended, 1 left out",
     ]
+
+
+def test_a_dataset_takes_the_wanted_episodes_alone_also_when_one_is_relabelled_later(tmp_path: Path) -> None:
+    path, root, said = recording(tmp_path / "a.mcap", *KEPT_AND_NOT), tmp_path / "dataset", list[str]()
+    changed(path, "a", outcome="failure")
+    changed(path, "c", outcome="")
+    following = follower(root, said, only=EpisodeFilter(outcomes=["success"]))
+    assert [following.look([path]), following.look([path])] == [0, 0]
+    assert not root.exists()
+    why = [
+        f"episode {id} of a.mcap is left out: its outcome is {word}" for id, word in (("a", "failure"), ("c", "none"))
+    ]
+    assert said == why
+    changed(path, "c", outcome="success")
+    assert following.look([path]) == 1
+    assert events_of(root) == [[*range(45, 60)]]
+    assert read_state(root).notes.only == EpisodeFilter(outcomes=["success"])
+    changed(path, "a", outcome="success")
+    assert append_once([path], root, DatasetOptions(), said.append) == 1, "the dataset keeps what it wants"
+
+
+def test_an_export_takes_the_wanted_episodes_alone_and_says_where_there_are_none(tmp_path: Path) -> None:
+    path, said = recording(tmp_path / "a.mcap", *KEPT_AND_NOT), list[str]()
+    by_hand = recording(tmp_path / "b.mcap", info=OTHER)
+    options = DatasetOptions(only=EpisodeFilter(tasks=["wipe"]), whole=True)
+    (root,) = export_lerobot.export_all([path, by_hand], tmp_path / "dataset", options, say=said.append)
+    assert events_of(root) == [[*range(45, 60)]]
+    assert verify_dataset(root).ok
+    assert said == [
+        "episode a of a.mcap is left out: its task is 'push'",
+        "b.mcap is left out: it has no episodes to choose from",
+    ]
+    with pytest.raises(RecordingDamaged, match="there is no kept episode that is wanted"):
+        export_lerobot.export_all([path], tmp_path / "none", DatasetOptions(only=EpisodeFilter(drivers=["x"])))
+    assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"tolerance": 3}, "a tolerance of 4 and not 3 events"),
+        ({"fps": 9}, "each event as a row and not 9 rows a second"),
+        ({"cameras": ["back"]}, "the cameras front and not back"),
+        (
+            {"layout": LayoutChoice(axes=["base.wz", "base.vx"])},
+            "axes base.vx.vel, base.wz.vel and not base.wz, base.vx",
+        ),
+        ({"layout": LayoutChoice(extras=["wrench"])}, "nothing and not wrench with it"),
+        ({"only": EpisodeFilter(tasks=["push"])}, "all of the kept episodes, and not those"),
+    ],
+)
+def test_a_dataset_refuses_other_options_than_those_that_it_was_made_with(
+    tmp_path: Path, options: dict[str, Any], words: str
+) -> None:
+    path, root = recording(tmp_path / "a.mcap", *KEPT_AND_NOT), tmp_path / "dataset"
+    follower(root).look([path])
+    names = read_state(root).info["features"]["action"]["names"]
+    for same in ({"tolerance": 4}, {"cameras": ["front"]}, {"layout": LayoutChoice(axes=names)}, {}):
+        follower(root, **same)
+    with pytest.raises(DatasetRefused, match=re.escape(words)):
+        follower(root, **options)
+    changed(path, "a", dropped=True)
+    changed(path, "c", dropped=True)
+    follower(root).look([path])
+    assert not (root / "meta" / "info.json").exists(), "no episode is left"
+    with pytest.raises(DatasetRefused, match="keeps what it was made with"):
+        follower(root, **options)
+
+
+def test_a_rate_that_was_chosen_is_kept_and_another_one_refused(tmp_path: Path) -> None:
+    path, root = recording(tmp_path / "a.mcap", *KEPT_AND_NOT), tmp_path / "dataset"
+    follower(root, fps=5).look([path])
+    follower(root, fps=5)
+    follower(root)
+    with pytest.raises(DatasetRefused, match="5 rows a second and not 6"):
+        follower(root, fps=6)
 
 
 def test_a_kept_episode_without_a_row_is_noted_in_the_dataset_also_before_it_begins(tmp_path: Path) -> None:

@@ -177,3 +177,15 @@ def test_a_file_that_was_cut_within_the_message_indexes_of_its_last_chunk_has_th
         path.write_bytes(whole[:end])
         complete_file(path, INFO)
         assert path.read_bytes() == whole
+
+
+def test_a_recording_that_is_still_written_is_called_that_and_not_interrupted(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    writer = Story(events=EVENTS).write(path, close=False)
+    writer.flush()
+    assert troubles(verify_file(path)) == ["the recording is still written and has no end yet"]
+    killed = tmp_path / "b.mcap"
+    killed.write_bytes(path.read_bytes())
+    assert troubles(verify_file(killed)) == ["the recording was interrupted and has no end"]
+    writer.close()
+    assert troubles(verify_file(path)) == []

@@ -2,18 +2,22 @@
 
 import sys
 import time
+from collections.abc import Iterable
 from datetime import datetime
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import msgspec
 import typer
 
-from lockstep.protocol.episodes import EpisodeOutcome
 from lockstep.server.cli.access.access import MakeSettings
+from lockstep.server.cli.option_group import with_options
 from lockstep.server.cli.options import RobotOption, StateDirOption
-from lockstep.server.cli.recordings.recordings import DirectoryOption, File, recording_file
+from lockstep.server.cli.recordings.choosing import OUTCOMES, EpisodeChoice, OutcomeWord
+from lockstep.server.cli.recordings.recordings import DirectoryOption, recording_file, recording_store
 from lockstep.server.recording.episodes.edits import EpisodeEdit, EpisodeEditRefused, add_edit, edited, read_edits
+from lockstep.server.recording.episodes.episode_filter import EpisodeFilter
 from lockstep.server.recording.episodes.episode_list import (
     EpisodeChange,
     ListedEpisode,
@@ -24,25 +28,34 @@ from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.export.lerobot_rows import episodes_of
 from lockstep.server.recording.format.episodes import EpisodeEntry
 from lockstep.server.recording.reading.reader import RecordingReader
-from lockstep.server.recording.recording_store import entry_of
+from lockstep.server.recording.recording_store import RecordingStore, entry_of
 from lockstep.server.util.display_names import escaped, printable
 
 __all__ = ["add_episode_command"]
 
 EXIT_USAGE = 2
 MAX_TIME = 4e9  # s since 1970
-OUTCOMES: dict[str, EpisodeOutcome] = {"success": "success", "failure": "failure", "none": ""}
+
+
+class StateWord(StrEnum):
+    OPEN = "open"
+    KEPT = "kept"
+    DISCARDED = "discarded"
+    CUT = "cut"
 
 
 def add_episode_command(app: typer.Typer, make_settings: MakeSettings) -> None:
     """Add the command. `make_settings` turns flags into settings, as for the other commands."""
 
     @app.command()
+    @with_options(EpisodeChoice)
     def episodes(
-        file: File,
+        file: Annotated[
+            Path | None, typer.Argument(help="A recording: its file, or its id. Unset: all in the directory.")
+        ] = None,
         edit: Annotated[str, typer.Option(help="Change the episode with this id, or number.")] = "",
         task: Annotated[str | None, typer.Option(help="Its task, in words.")] = None,
-        outcome: Annotated[str | None, typer.Option(help="success, failure or none.")] = None,
+        outcome: Annotated[OutcomeWord | None, typer.Option(help="Its outcome.")] = None,
         first: Annotated[int | None, typer.Option(help="Trim: its first event.")] = None,
         last: Annotated[int | None, typer.Option(help="Trim: its last event.")] = None,
         drop: Annotated[bool | None, typer.Option("--drop/--undrop", help="Take it out of datasets; back in.")] = None,
@@ -54,12 +67,15 @@ def add_episode_command(app: typer.Typer, make_settings: MakeSettings) -> None:
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
+        only_state: Annotated[
+            list[StateWord] | None, typer.Option(help="List only episodes of which this became.")
+        ] = None,
         as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+        *,
+        options: EpisodeChoice,
     ) -> None:
-        """List the episodes of a recording; change them in a file beside it. The recording never changes."""
-        path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
-        if outcome is not None and outcome not in OUTCOMES:
-            raise _usage("--outcome is success, failure or none")
+        """List episodes, of a recording or of all; change them in a file beside it. The recording never changes."""
+        settings = make_settings(state_dir=state_dir)
         change = EpisodeEdit(
             at=round(time.time(), 3),
             by="command line",
@@ -74,16 +90,65 @@ def add_episode_command(app: typer.Typer, make_settings: MakeSettings) -> None:
         )
         if change.kinds and not (edit or undo is not None):
             raise _usage("--edit names the episode to change")
+        chosen = _Choice(options.filter(), only_state or [])
+        if file is None:
+            if change.kinds or edit or changes:
+                raise _usage("name the recording whose episodes to change, or whose changes to list")
+            _list_all(recording_store(settings, robot, directory), chosen, as_json=as_json)
+            return
+        path = recording_file(file, settings, robot, directory)
+        if change.kinds and chosen:
+            raise _usage("--only-… chooses what is listed; --edit names the episode to change")
         try:
             found = _found(path, edit, change, after)
         except (RecordingError, OSError, msgspec.ValidationError) as error:
             raise _usage(str(error)) from error
+        listed = chosen.of(found.episodes)
         if as_json:
-            told = found.changes if changes else found.episodes
+            told = found.changes if changes else listed
             sys.stdout.write(msgspec.json.encode(told).decode() + "\n")
         else:
-            lines = map(_change_line, found.changes) if changes else map(_line, found.episodes)
-            sys.stdout.write("".join(line + "\n" for line in lines))
+            _write(map(_change_line, found.changes) if changes else map(_line, listed))
+
+
+class _Choice(NamedTuple):
+    """Which episodes are listed."""
+
+    only: EpisodeFilter
+    states: list[StateWord]
+
+    def __bool__(self) -> bool:
+        return bool(self.only or self.states)
+
+    def of(self, episodes: list[ListedEpisode]) -> list[ListedEpisode]:
+        states = self.states or list(StateWord)
+        return [each for each in episodes if each.state in states and not self.only.why_not(each)]
+
+
+def _list_all(store: RecordingStore, chosen: _Choice, *, as_json: bool) -> None:
+    """List the episodes of all recordings that are complete, oldest first; one that cannot be read is said."""
+    found = []
+    for entry in reversed(store.entries()):
+        path = store.path(entry.id)
+        try:
+            of_one = None if path is None else _found(path, "", EpisodeEdit(at=0.0), None)
+        except (RecordingError, OSError) as error:
+            typer.echo(f"lockstep: {escaped(error)}", err=True)
+            continue
+        if of_one is not None and (listed := chosen.of(of_one.episodes)):
+            found.append(msgspec.structs.replace(of_one, episodes=listed))
+    if as_json:
+        sys.stdout.write(msgspec.json.encode(found).decode() + "\n")
+        return
+    for recording in found:
+        sys.stdout.write(printable(recording.info.id) + "\n")
+        _write(map(_line, recording.episodes))
+    if not found:
+        typer.echo(f"lockstep: no such episode in {escaped(store.directory)}", err=True)
+
+
+def _write(lines: Iterable[str]) -> None:
+    sys.stdout.write("".join(line + "\n" for line in lines))
 
 
 def _found(path: Path, edit: str, change: EpisodeEdit, after: int | None) -> RecordingEpisodes:

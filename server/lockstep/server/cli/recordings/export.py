@@ -5,11 +5,14 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
+import msgspec
 import typer
 
 from lockstep.server.cli.access.access import MakeSettings
 from lockstep.server.cli.extras import load_extra
+from lockstep.server.cli.option_group import with_options
 from lockstep.server.cli.options import RobotOption, StateDirOption
+from lockstep.server.cli.recordings.choosing import EpisodeChoice
 from lockstep.server.cli.recordings.recordings import (
     EXTRA_OF,
     DirectoryOption,
@@ -23,7 +26,6 @@ from lockstep.server.util.display_names import escaped, printable
 
 __all__ = ["add_export_command"]
 
-DATASET_TOLERANCE = 4  # events, as the page's own
 EXTRAS = ("wrench", "ranges")
 DATASET = "lerobot: "
 TABLES = (ExportFormat.CSV, ExportFormat.PARQUET)
@@ -33,6 +35,7 @@ def add_export_command(app: typer.Typer, make_settings: MakeSettings) -> None:
     """Add the command. `make_settings` turns flags into settings, as for the other commands."""
 
     @app.command()
+    @with_options(EpisodeChoice)
     def export(
         to: Annotated[
             ExportFormat, typer.Option(help="mp4: pictures and sound; csv, parquet: tables; others: for these tools.")
@@ -43,8 +46,9 @@ def add_export_command(app: typer.Typer, make_settings: MakeSettings) -> None:
         ] = None,
         task: Annotated[str, typer.Option(help=DATASET + "the task of recordings without episodes, in words.")] = "",
         tolerance: Annotated[
-            int, typer.Option(min=0, help=DATASET + "events by which a picture may be older than its row.")
-        ] = DATASET_TOLERANCE,
+            int | None,
+            typer.Option(min=0, help=DATASET + "events by which a picture may be older than its row. Unset: 4."),
+        ] = None,
         fps: Annotated[
             int | None, typer.Option(min=1, max=1000, help=DATASET + "rows per second. Unset: each event is a row.")
         ] = None,
@@ -71,35 +75,39 @@ def add_export_command(app: typer.Typer, make_settings: MakeSettings) -> None:
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
+        *,
+        options: EpisodeChoice,
     ) -> None:
         """Write recordings in another form; lerobot: the kept episodes of all of them as one dataset."""
         settings = make_settings(state_dir=state_dir)
         paths = [recording_file(file, settings, robot, directory) for file in files or []]
         if kept and to not in TABLES:
             raise usage_error("--kept is for csv and parquet; lerobot has kept episodes alone")
+        only = options.filter()
         if to is ExportFormat.LEROBOT:
             store = recording_store(settings, robot, directory)
-            options = _options(
+            chosen = _options(
                 task=task,
                 whole=whole,
                 tolerance=tolerance,
                 fps=fps,
                 cameras=_words(cameras),
                 layout={"axes": _words(axes), "state": _words(state), "extras": extra or []},
+                only=msgspec.to_builtins(only),
             )
-            _export_dataset(paths, store.files, out, options, append=append, follow=follow)
+            _export_dataset(paths, store.files, out, chosen, append=append, follow=follow)
             return
-        if follow or append:
-            raise usage_error("--append and --follow are for lerobot alone")
+        if follow or append or only:
+            raise usage_error("--append, --follow and --only-… are for lerobot alone")
         if not paths:
             raise usage_error("name a recording")
         if out is not None and len(paths) > 1:
             raise usage_error("--out takes one recording at a time, but for lerobot")
         # Loaded only here: what needs no extra takes none.
         exporter: Any = load_extra(f"lockstep.server.recording.export.export_{to.value}", EXTRA_OF.get(to, "export"))
-        only = {"kept": True} if kept else {}
+        rows = {"kept": True} if kept else {}
         for path in paths:
-            for each in or_usage(partial(exporter.export, path, out, task, **only)):
+            for each in or_usage(partial(exporter.export, path, out, task, **rows)):
                 _say(escaped(each))
 
 

@@ -15,6 +15,7 @@ from lockstep.protocol.description import RobotDescription
 from lockstep.server.recording.dataset.appending import append, is_dataset, note_without_rows, notes_of_none, read_state
 from lockstep.server.recording.dataset.commit import recover
 from lockstep.server.recording.dataset.growing import GrowingRecording
+from lockstep.server.recording.dataset.kept_options import check_options
 from lockstep.server.recording.dataset.removing import event_range, remove
 from lockstep.server.recording.episodes.edit_rules import EditedEpisode, apply_edits
 from lockstep.server.recording.episodes.edits import edits_version, read_edits
@@ -26,6 +27,7 @@ from lockstep.server.recording.export.export_lerobot import (
     cameras_of,
     left_out,
     new_state,
+    no_choice,
     no_rows,
     not_as_a_whole,
 )
@@ -50,8 +52,8 @@ NOT_FOLLOWED = "it has no episodes, and what is followed are kept episodes alone
 DISCARDED = "it was discarded, in another copy of the recording"
 MOST_TROUBLES = 20  # that are said in a row, so that words that differ each time have an end
 FULL = (errno.ENOSPC, errno.EDQUOT)
-Key = tuple[str, int, int]  # of a stretch: its episode and its first and last event
-FILE: Key = ("", 0, 0)  # the file itself
+Key = tuple[str, int, int, str]  # of a stretch: its episode, its first and last event, and why it is not wanted
+FILE: Key = ("", 0, 0, "")  # the file itself
 
 
 @dataclass
@@ -105,7 +107,7 @@ class DatasetFollower:
 
     Args:
         root: the dataset; it begins with the first kept episode
-        options: of a new dataset; one that is there already keeps its own
+        options: of a new dataset; one that is there already keeps its own, and refuses others
         say: is told each episode that was appended, and what was left out, and why
 
     Attributes:
@@ -123,7 +125,11 @@ class DatasetFollower:
         self._wholes: Mapping[Path, str] | None = None  # None: files without episodes are left out
         self._state: DatasetState | None = read_state(root) if is_dataset(root) else None
         self._emptied: DatasetNotes | None = None  # of a dataset without episodes, which the next one begins anew
-        self._begin_anew(notes_of_none(root))
+        emptied = notes_of_none(root)
+        notes = self._state.notes if self._state is not None else emptied
+        if notes is not None:
+            check_options(root.name, options, notes, {} if self._state is None else self._state.info)
+        self._begin_anew(emptied)
         self._robot: RobotDescription | None = None
         self._files: dict[Path, _File] = {}  # those that were there at the last look
         self._without_rows: list[EpisodeRows] = []  # that the dataset is to note when it begins
@@ -201,8 +207,8 @@ class DatasetFollower:
             return 0
         with growing.reader() as reader:
             stretches = stretches_of(reader, file.episodes, self._options.task if is_whole else None)
-            new = (each for each in stretches if self._is_due(each, since) and self._is_new(file, each))
-            return sum(self._append(reader, each, file) for each in new)
+            due = (each for each in stretches if self._is_due(each, since) and self._comes_in(file, each))
+            return sum(self._append(reader, each, file) for each in due)
 
     def _is_due(self, stretch: Stretch, since: int) -> bool:
         """Return whether it ended late enough, or is kept of what was taken out."""
@@ -219,6 +225,7 @@ class DatasetFollower:
                 fps=emptied.fps or None,
                 cameras=[topic.removeprefix(CAMERA) for topic in emptied.topics],
                 layout=emptied.layout,
+                only=emptied.only,
             )
 
     def _take_out(self, discarded: Sequence[EventRange], files: Sequence[_File]) -> None:
@@ -253,13 +260,16 @@ class DatasetFollower:
             if (file.growing.index.recording, file.growing.index.epoch) in changed:
                 file.passed &= {FILE}
 
-    def _is_new(self, file: _File, stretch: Stretch) -> bool:
+    def _comes_in(self, file: _File, stretch: Stretch) -> bool:
+        """Return whether it is new and wanted; say once why not."""
         if _is_of(stretch, self._discarded):
             self._pass_over(file, _key(stretch), left_out(stretch.path, stretch.episode, DISCARDED))
             return False
         found = None if self._state is None else present(self._state.notes.episodes, stretch)
         if found is None:
-            return _key(stretch) not in file.passed
+            if why := no_choice(stretch, self._options.only if self._state is None else self._state.notes.only):
+                self._pass_over(file, _key(stretch, why), left_out(stretch.path, stretch.episode, why))
+            return not why and _key(stretch) not in file.passed
         if not found.is_same or found.other_task:
             why = found.in_words() + ("" if found.is_same else ", from before a change")
             self._pass_over(file, _key(stretch), left_out(stretch.path, stretch.episode, why))
@@ -294,7 +304,7 @@ class DatasetFollower:
             raise DatasetRefused(f"the dataset is of another robot: {state.robot}")
         layout = layout_of(robot, self._options.layout if state is None else state.notes.layout)
         topics = cameras_of(reader, self._options.cameras) if state is None else state.notes.topics
-        tolerance = self._options.tolerance if state is None else state.notes.tolerance
+        tolerance = self._options.most_behind if state is None else state.notes.tolerance
         fps = self._options.fps if state is None else state.fps if state.notes.has_rate else None
         (rows,) = rows_of(reader, layout, [stretch], topics, tolerance, fps)
         if not rows.frames:
@@ -331,8 +341,8 @@ def _age(path: Path) -> tuple[str, int]:
     return (name, int(part)) if name and part.isdecimal() and part.isascii() else (path.stem, 1)
 
 
-def _key(stretch: Stretch) -> Key:
-    return stretch.episode, stretch.first_event, stretch.last_event
+def _key(stretch: Stretch, not_wanted: str = "") -> Key:
+    return stretch.episode, stretch.first_event, stretch.last_event, not_wanted
 
 
 def _is_of(stretch: Stretch, ranges: Sequence[EventRange]) -> bool:

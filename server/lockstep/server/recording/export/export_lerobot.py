@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 
 from lockstep.protocol.description import RobotDescription
+from lockstep.server.recording.episodes.episode_filter import EpisodeFilter
 from lockstep.server.recording.errors import DatasetRefused, RecordingDamaged
 from lockstep.server.recording.export.lerobot_batch import DatasetState, noted, noted_without_rows, write_batch
 from lockstep.server.recording.export.lerobot_layout import DatasetLayout, LayoutChoice, layout_of
@@ -19,6 +20,7 @@ from lockstep.server.recording.export.lerobot_meta import EVENTS, RATE, DatasetN
 from lockstep.server.recording.export.lerobot_present import present
 from lockstep.server.recording.export.lerobot_rows import (
     EpisodeRows,
+    Stretch,
     check_same_robot,
     episodes_now,
     rows_of,
@@ -40,6 +42,7 @@ __all__ = [
     "export_all",
     "left_out",
     "new_state",
+    "no_choice",
     "no_rows",
     "not_as_a_whole",
     "options_of",
@@ -55,10 +58,16 @@ class DatasetOptions(msgspec.Struct, frozen=True, kw_only=True):
 
     task: str = ""  # of recordings without episodes, in words
     whole: bool = False  # each file without episodes is one as a whole, also where that is not certain
-    tolerance: int = TOLERANCE  # events by which a picture may be older than its row
+    tolerance: int | None = None  # events by which a picture may be older than its row; None: `TOLERANCE`
     fps: int | None = None  # Hz, of the rows; None: each event is a row
     cameras: list[str] = []  # names; empty: all that the first recording has pictures of
     layout: LayoutChoice = LayoutChoice()
+    only: EpisodeFilter = EpisodeFilter()  # which of the kept episodes
+
+    @property
+    def most_behind(self) -> int:
+        """The tolerance: events by which a picture may be older than its row."""
+        return TOLERANCE if self.tolerance is None else self.tolerance
 
 
 def export(path: Path, out: Path | None, task: str) -> list[Path]:
@@ -84,8 +93,8 @@ def export_all(
         out: a new directory; None: one beside the first recording
         options: or the task alone
         tolerance: instead of that in the options
-        say: is told each kept episode that has no row, or whose events another file has given already, and of each
-            file without episodes what becomes of it
+        say: is told each kept episode that is not wanted, has no row, or whose events another file has given already,
+            and of each file without episodes what becomes of it
 
     Raises:
         RecordingError: a recording cannot be read, none has a row, they are of different robots, or the options do not
@@ -101,9 +110,9 @@ def export_all(
     description, layout, topics, read = _read(paths, chosen, say)
     without = [each for each in read if not each.frames]
     for each in without:
-        say(left_out(each.stretch.path, each.stretch.episode, no_rows(chosen.tolerance)))
+        say(left_out(each.stretch.path, each.stretch.episode, no_rows(chosen.most_behind)))
     if len(without) == len(read):
-        raise RecordingDamaged(f"no kept episode has a row: {no_rows(chosen.tolerance)}")
+        raise RecordingDamaged(f"no kept episode has a row: {no_rows(chosen.most_behind)}")
     episodes = [each for each in read if each.frames]
     state = new_state(description, layout, topics, chosen, episodes, without)
     with unfinished(root) as partial:
@@ -121,13 +130,14 @@ def new_state(
 ) -> DatasetState:
     """Return the state of a dataset that has nothing yet. Without a rate of its own it has that of these episodes."""
     notes = DatasetNotes(
-        tolerance=options.tolerance,
+        tolerance=options.most_behind,
         has_rate=options.fps is not None,
         sampling=EVENTS if options.fps is None else RATE,
         cameras=[camera_key(topic) for topic in topics],
         topics=topics,
         units=layout.units,
         layout=layout.choice,
+        only=options.only,
         episodes=[],
     )
     notes = noted_without_rows(notes, without_rows)
@@ -140,6 +150,13 @@ def no_rows(tolerance: int) -> str:
         "no event has a feedback, a command that answers it, and a picture of every camera "
         f"that is at most {tolerance} events older"
     )
+
+
+def no_choice(stretch: Stretch, only: EpisodeFilter) -> str:
+    """Return in words why a stretch is not wanted; "" if it is."""
+    if only and not stretch.episode:
+        return "it has no episodes to choose from"
+    return only.why_not(stretch)
 
 
 def left_out(path: Path, episode: str, why: str) -> str:
@@ -190,14 +207,18 @@ def _read(
             if sorted(topics) != sorted(cameras):
                 raise RecordingDamaged(f"{path.name} has other cameras than {paths[0].name}")
             for stretch in stretches_of(reader, now, options.task):
+                if why := no_choice(stretch, options.only):
+                    say(left_out(path, stretch.episode, why))
+                    continue
                 if found := present([noted(each) for each in episodes if each.frames], stretch):
                     say(left_out(path, stretch.episode, found.in_words()))
                     continue
                 if not stretch.episode:
                     say(as_a_whole(path, stretch.task))
-                episodes += rows_of(reader, layout, [stretch], cameras, options.tolerance, options.fps)
+                episodes += rows_of(reader, layout, [stretch], cameras, options.most_behind, options.fps)
     if description is None or layout is None or not episodes:
-        raise RecordingDamaged("; ".join(["there is no kept episode", *left]))
+        none = "there is no kept episode" + (" that is wanted" if options.only else "")
+        raise RecordingDamaged("; ".join([none, *left]))
     return description, layout, cameras, episodes
 
 

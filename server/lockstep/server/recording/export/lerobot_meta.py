@@ -10,6 +10,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from lockstep.protocol.serial import event_gap
+from lockstep.server.recording.episodes.episode_filter import EpisodeFilter
 from lockstep.server.recording.export.episode_commands import EpisodeCommands
 from lockstep.server.recording.export.lerobot_layout import LayoutChoice
 from lockstep.server.recording.format.records import Whole
@@ -101,6 +102,7 @@ class DatasetNotes(msgspec.Struct, frozen=True, kw_only=True):
     drivers: list[str] = []  # names of all that drove
     units: dict[str, str] = {}  # of the values in state and action, by name
     layout: LayoutChoice = LayoutChoice()
+    only: EpisodeFilter = EpisodeFilter()  # which of the kept episodes it takes
     success: str = "lockstep.success: 1 success, 0 failure, -1 not said"
     intervention: str = (
         "lockstep.intervention: 1 where the driver was no policy, in an episode that a policy had driven before, else 0"

@@ -70,6 +70,8 @@ class Stretch(NamedTuple):
     ended: int  # µs since 1970; pictures that came later are not of it, so that nobody has to wait for them
     recorded: tuple[str, ...] = ()  # ids of the recorded episodes that it was made of
     marks: tuple[tuple[int, str], ...] = ()  # event, words
+    drivers: tuple[str, ...] = ()  # names of those who drove in it
+    problems: tuple[str, ...] = ()  # that the live checks have seen
 
 
 class EpisodeRows(NamedTuple):
@@ -134,6 +136,8 @@ def _stretch(reader: RecordingReader, episode: EditedEpisode) -> Stretch:
         entry.ended,
         episode.recorded,
         tuple(mark for mark in entry.marks if _is_marked_in(mark[0], entry)),
+        tuple(entry.drivers),
+        tuple(entry.problems),
     )
 
 

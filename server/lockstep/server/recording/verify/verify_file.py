@@ -17,6 +17,7 @@ from lockstep.server.recording.format.topics import stream_of
 from lockstep.server.recording.reading.raw_records import MAGIC, MAX_RECORD, raw_records
 from lockstep.server.recording.reading.reader import Record, RecordingReader
 from lockstep.server.recording.reading.scan import Scan, scan_file
+from lockstep.server.recording.recording_store import is_written
 from lockstep.server.recording.verify.promises import Verdict, Verifier
 from lockstep.server.recording.verify.verify_indexes import IndexChecker
 from lockstep.server.recording.verify.verify_signature import SignatureChecker
@@ -36,18 +37,27 @@ def verify_file(path: Path, key: str = "") -> Verdict:
         RecordingDamaged: it is no recording at all.
         OSError: it cannot be read.
     """
+    written = _is_written(path)  # asked first: it may end meanwhile, and then it is whole
     with RecordingReader(path) as reader:
         verifier = Verifier(reader.info.epoch)
         if reader.interrupted:
-            verifier.fail("readable", "the recording was interrupted and has no end")
+            what = "is still written" if written else "was interrupted"
+            verifier.fail("readable", f"the recording {what} and has no end" + (" yet" if written else ""))
         elif not _is_summary_whole(path):
             verifier.fail("readable", "the summary does not match its checksum")
         scan = scan_file(path, reader.info)
         # Behind a record that is broken only the file's own index leads to chunks.
         with RecordingReader(path, scan.index if scan.ended else reader.index) as judged:
             ended = _show_records(verifier, judged, reader.index)
-        _show_signatures(verifier, path, reader, scan, key)
+        _show_signatures(verifier, path, reader, scan, key, written=written)
         return verifier.verdict(ended)
+
+
+def _is_written(path: Path) -> bool:
+    try:
+        return is_written(path)
+    except OSError:  # a file system without locks; whether it can be read shows itself
+        return False
 
 
 def _show_records(verifier: Verifier, reader: RecordingReader, index: EventIndex) -> int:
@@ -82,7 +92,9 @@ def _is_summary_whole(path: Path) -> bool:
         return zlib.crc32(file.read(at + _footer.size - 4 - start)) == int(checksum)
 
 
-def _show_signatures(verifier: Verifier, path: Path, reader: RecordingReader, scan: Scan, key: str) -> None:
+def _show_signatures(
+    verifier: Verifier, path: Path, reader: RecordingReader, scan: Scan, key: str, *, written: bool
+) -> None:
     """Check indexes and signatures, and show `verifier` the report."""
     checker = SignatureChecker(reader.info, IndexChecker(None if reader.interrupted else reader.index), key)
     with open_regular(path) as file:
@@ -93,7 +105,7 @@ def _show_signatures(verifier: Verifier, path: Path, reader: RecordingReader, sc
         except RecordingError as error:
             verifier.fail("readable", error.detail)
     checker.compare(scan)
-    report = checker.report()
+    report = checker.report(written=written)
     verifier.signed(report)
     if report.state == "unsigned":
         for text in checker.index_faults:

@@ -208,8 +208,8 @@ class SignatureChecker:
         for text in self._indexes.compare(scan):
             self._index_fault(text)
 
-    def report(self) -> SignatureReport:
-        """Return the report, after the last record."""
+    def report(self, *, written: bool = False) -> SignatureReport:
+        """Return the report, after the last record. `written`: more will follow."""
         report, last = self._report, self._last
         if not report.signatures:
             faults = [SignatureFault(1, 0, "the recording is not signed")] if self._key else []
@@ -221,5 +221,6 @@ class SignatureChecker:
             report.state = "broken"
         elif last is None or not last.final:
             report.state = "open"
-            self._fault("the closing signature is missing: the console was interrupted, or the end was cut off")
+            why = "it is still written" if written else "the console was interrupted, or the end was cut off"
+            self._fault(f"the closing signature is missing: {why}")
         return report
