@@ -117,6 +117,9 @@ class _Server(uvicorn.Server):
             self._accepting.cancel()
             await asyncio.wait((self._accepting,))
         await super().shutdown(sockets)
+        for connection in list(self.server_state.connections):  # as of a client that does not answer the end of TLS
+            connection.transport.abort()
+        await asyncio.sleep(0)  # then their sockets are closed
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
