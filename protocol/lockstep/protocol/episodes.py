@@ -106,5 +106,6 @@ class EpisodeState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", 
     cut: Count = 0  # ended by something else than a person; they are in no dataset
     last: str = ""  # what became of the last one, in words
     lost: EpisodeCut | Literal[""] = ""  # why the last one was lost; "": it was not
+    reads_recordings: bool = False  # of before the console's start: what became of the last episode is not known yet
     reset_action: str = ""  # name of the robot's action that is run between episodes; "" for none
     problems: list[EpisodeProblem] = []

@@ -4,6 +4,7 @@ import asyncio
 import os
 import shutil
 import signal
+import sys
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
@@ -11,18 +12,22 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser, Locator, expect
 
-from lockstep.bench.browsers.console_page import open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
 from lockstep.bench.episodes.faults.fault_run import ROBOT
+from lockstep.bench.episodes.faults.policy_fault import PROGRAM
 from lockstep.bench.episodes.small_disk import small_disk
 from lockstep.bench.harness.driving import drive_on
+from lockstep.bench.harness.processes import started
 from lockstep.bench.harness.stack import running_bridge
 from lockstep.client import Console
 from lockstep.robot_bridge.robots.so101.model_source import FOLDER_VARIABLE
 from lockstep.server.recording.reading.reader import RecordingReader
+from tests.client.live.test_policies import policy_link
 from tests.e2e.accessibility import findings
 from tests.e2e.recordings.test_chromium_episodes import SETTINGS
 from tests.e2e.so101 import SO101, needs_so101
 from tests.support.stack import Stack, running_console, running_stack
+from tests.waiting import PATIENCE
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(240)]
 
@@ -139,9 +144,116 @@ async def test_the_page_says_what_became_of_an_episode_when_the_console_is_kille
             await expect(bar.get_by_role("button", name=name, exact=True)).to_be_hidden()
         port = first.console.rsplit(":", 1)[1]
         async with running_console(tmp_path, bridge.address, bridge.event_log, (*record, "--port", port)):
-            became = "Episode 1 is lost: the console has ended" if phase == "open" else "No episode yet"
+            became = "Episode 1 is lost: the console ended" if phase == "open" else "No episode yet"
             await expect(words).to_have_text(became, timeout=60_000)
             await expect(words).to_be_visible()
+
+
+@pytest.mark.parametrize("resets", [False, True])
+async def test_after_the_console_was_killed_the_page_says_of_a_kept_episode_what_the_recording_says(
+    tmp_path: Path, chromium: Browser, monkeypatch: pytest.MonkeyPatch, resets: bool
+) -> None:
+    """It is killed as soon as the page asks it to keep the episode, or in the reset behind the kept one."""
+    monkeypatch.setenv("LOCKSTEP_EPISODES__COUNTDOWN_SECONDS", "0")
+    monkeypatch.setenv("LOCKSTEP_EPISODES__RESET_ACTION", "home" if resets else "")
+    recordings = tmp_path / "recordings"
+    record = ("--record", str(recordings))
+    async with running_bridge("planar") as bridge, AsyncExitStack() as closing:
+        async with running_console(tmp_path, bridge.address, bridge.event_log, record) as first:
+            console = await closing.enter_async_context(open_console(chromium, first.operator))
+            words = console.page.locator(".episode-words")
+            await _take_one(console, words)
+            await console.page.keyboard.press("k")
+            if resets:
+                await expect(words).to_have_text("Reset: home")
+            await first.running.kill()
+        if resets:
+            await expect(words).to_have_text("The console does not answer")
+        port = first.console.rsplit(":", 1)[1]
+        async with running_console(tmp_path, bridge.address, bridge.event_log, (*record, "--port", port)) as second:
+            later = await closing.enter_async_context(open_console(chromium, second.supervisor))
+            await later.until_live()
+            became = await asyncio.to_thread(_became, recordings)
+            for each in (words, later.page.locator(".episode-words")):
+                await expect(each).to_have_text(became, timeout=60_000)
+            assert not resets or became == "Episode 1 is kept"
+
+
+async def test_the_page_says_of_an_episode_that_was_kept_as_the_bridge_was_killed_what_the_recording_says(
+    tmp_path: Path, chromium: Browser
+) -> None:
+    recordings = tmp_path / "recordings"
+    async with (
+        running_bridge("planar") as bridge,
+        running_console(tmp_path, bridge.address, bridge.event_log, ("--record", str(recordings))) as stack,
+        _taking(chromium, stack, "bridge-killed-keeping") as (bar, driver),
+    ):
+        await drive_on(driver, [0.2, 0.0, 0.0])
+        await bar.page.keyboard.press("k")
+        await bridge.process.kill()
+        await expect(bar.locator(".episode-words")).to_contain_text("Episode 1 is ")
+        said = await bar.locator(".episode-words").inner_text()
+    assert (said.startswith("Episode 1 is kept"), _states(recordings)) in ((True, ["kept"]), (False, ["cut"]))
+
+
+@needs_so101
+async def test_a_policy_that_is_killed_leaves_the_robot_at_rest_and_the_episode_to_the_person(
+    half_rate: None, tmp_path: Path, chromium: Browser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(FOLDER_VARIABLE, SO101[FOLDER_VARIABLE])
+    monkeypatch.setenv("LOCKSTEP_EPISODES__COUNTDOWN_SECONDS", "0")
+    recordings = tmp_path / "recordings"
+    async with (
+        running_bridge(ROBOT) as bridge,
+        running_console(tmp_path, bridge.address, bridge.event_log, ("--record", str(recordings))) as stack,
+        open_console(chromium, stack.operator + "&name=Ada") as ada,
+        started((sys.executable, "-m", PROGRAM, await policy_link(stack), "net")) as policy,
+    ):
+        await policy.read(PATIENCE)
+        policies, words = ada.page.get_by_role("region", name="Policies"), ada.page.locator(".episode-words")
+        await ada.until_live()
+        await ada.until("s.seat.mine")
+        await _begin(ada, words)
+        await policies.get_by_role("button", name="Give to net").click()
+        await expect(policies.get_by_text("Policy net drives")).to_be_visible()
+        await ada.until("s.at_rest === false")
+        await policy.kill()
+        await ada.until("s.at_rest === true")
+        await expect(words).to_contain_text("Take 1")
+        await policies.get_by_role("button", name="Take over").click()
+        await ada.until("s.seat.mine && !s.armed && s.at_rest === true")
+        assert await findings(ada.page) == []
+        if SHOTS:
+            await ada.page.screenshot(path=f"{SHOTS}/policy-killed.png")
+        await ada.page.keyboard.press("y")
+        await expect(ada.page.locator(".episode-count")).to_have_text("1 kept")
+    assert _states(recordings) == ["kept"]
+
+
+async def _begin(console: ConsolePage, words: Locator) -> None:
+    await console.page.locator(".episode-task").fill("push the box")
+    await console.page.locator(".episode-task").press("Enter")
+    await expect(words).to_contain_text("Take 1")
+
+
+async def _take_one(console: ConsolePage, words: Locator) -> None:
+    """Begin an episode, and drive in it."""
+    await console.until_live()
+    await console.until("s.seat.mine")
+    await _begin(console, words)
+    await console.arm()
+    await console.drive_forward()
+    await console.pad.let_go()
+    await console.until("s.at_rest === true")
+
+
+def _became(folder: Path) -> str:
+    """What the bar has to say of the only episode of all files."""
+    states = []
+    for path in sorted(folder.glob("*.mcap")):
+        with RecordingReader(path) as reader:
+            states += [each.state for each in reader.index.episodes]
+    return "Episode 1 is kept" if states == ["kept"] else "Episode 1 is lost: the console ended"
 
 
 async def _fill(ballast: Path, free: int) -> None:

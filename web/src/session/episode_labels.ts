@@ -81,6 +81,10 @@ export function unknownWords({ number }: Pick<EpisodeState, "number">): string {
   return `Take ${number}: the console does not answer`;
 }
 
+function readsWords({ number }: Pick<EpisodeState, "number">): string {
+  return `take ${number}: the console reads its recordings`;
+}
+
 /** Whether the last episode was lost. */
 export function hasLost({ phase, lost }: EpisodeState): boolean {
   return phase === "idle" && lost !== "";
@@ -136,12 +140,13 @@ export function leftEpisode(state: EpisodeState | null): LeftEpisode | null {
 }
 
 /**
- * The state with what became of that episode, where the console does not say it: another process of the console, after
- * the one before has ended, knows of none.
+ * The state with what became of that episode, where the console does not say it: another process of the console says it
+ * once it has read the recordings, unless the episode is in none.
  */
 export function withLeftEpisode(state: EpisodeState, left: LeftEpisode | null): EpisodeState {
   if (left === null || state.last !== "" || state.episode === left.episode) return state;
-  return { ...state, last: `episode ${left.number} is lost: the console has ended`, lost: "console_ended" };
+  if (state.reads_recordings) return { ...state, last: readsWords(left) };
+  return { ...state, last: `episode ${left.number} is lost: the console ended`, lost: "console_ended" };
 }
 
 function countWords({ kept, discarded, cut }: EpisodeState): string {

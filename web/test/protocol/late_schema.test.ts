@@ -3,7 +3,17 @@ import { lateMisfit } from "../../src/protocol/late_schema";
 
 const IDLE = {
   ...{ type: "episode", phase: "idle", episode: "", number: 0, task: "", by: "", seconds_left: 0, since: 0 },
-  ...{ first_event: 0, kept: 0, discarded: 0, cut: 0, last: "", lost: "", reset_action: "", problems: [] },
+  ...{
+    first_event: 0,
+    kept: 0,
+    discarded: 0,
+    cut: 0,
+    last: "",
+    lost: "",
+    reads_recordings: false,
+    reset_action: "",
+    problems: [],
+  },
 };
 const ANSWER = { type: "episode_answer", id: "x", reason: "empty", detail: "", episode: "" };
 

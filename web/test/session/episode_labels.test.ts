@@ -23,6 +23,7 @@ const IDLE: EpisodeState = {
   cut: 0,
   last: "",
   lost: "",
+  reads_recordings: false,
   reset_action: "",
   problems: [],
 };
@@ -123,9 +124,11 @@ it("says that an episode is lost with the console", () => {
   expect(leftEpisode(IDLE)).toBeNull();
   expect(leftEpisode(null)).toBeNull();
   expect(withLeftEpisode(IDLE, left)).toMatchObject({
-    last: "episode 3 is lost: the console has ended",
+    last: "episode 3 is lost: the console ended",
     lost: "console_ended",
   });
+  const reads = withLeftEpisode({ ...IDLE, reads_recordings: true }, left);
+  expect(reads).toMatchObject({ last: "take 3: the console reads its recordings", lost: "" });
   const goesOn = { ...IDLE, phase: "open", episode: "a", number: 3 } as const;
   expect(withLeftEpisode(goesOn, left)).toEqual(goesOn);
   const kept = { ...IDLE, last: "episode 3 is kept" };

@@ -1,10 +1,12 @@
 """Keeps the directory of recordings within its bounds of age and size, and says in the audit what was deleted."""
 
 import asyncio
+import time
 
 import structlog
 
 from lockstep.server.audit.audit_trail import AuditTrail
+from lockstep.server.recording.episodes.episode_before import EpisodeBefore, episode_before
 from lockstep.server.recording.recording_store import RecordingStore
 
 __all__ = ["Retention"]
@@ -19,22 +21,24 @@ class Retention:
         self._store = store
         self._audit = audit
 
-    async def prepare(self) -> None:
-        """Make the directory, complete interrupted recordings, and make room."""
-        self._tell(await asyncio.to_thread(self._prepare))
+    async def prepare(self) -> EpisodeBefore | None:
+        """Make the directory, complete interrupted recordings, and make room; return the last episode recorded."""
+        deleted, before = await asyncio.to_thread(self._prepare)
+        self._tell(deleted)
+        return before
 
     async def prune(self) -> None:
         """Make room."""
         self._tell(await asyncio.to_thread(self._prune))
 
-    def _prepare(self) -> list[str]:
+    def _prepare(self) -> tuple[list[str], EpisodeBefore | None]:
         try:
             self._store.prepare()
-            self._store.recover()
-            return self._store.prune()
+            before = episode_before(self._store, set(self._store.recover()), time.time())
+            return self._store.prune(), before
         except OSError as error:
             log.error("the directory of recordings cannot be used", reason=str(error))
-            return []
+            return [], None
 
     def _prune(self) -> list[str]:
         try:

@@ -156,12 +156,16 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
 
   function take(said: ServerMessage | undefined): void {
     if (said?.type === "episode") {
-      const message = withLeftEpisode(said, left ?? leftEpisode(state));
-      left = null;
+      const before = left ?? leftEpisode(state);
+      const message = withLeftEpisode(said, before);
+      const isSettled = left !== null && !said.reads_recordings;
+      left = said.reads_recordings ? before : null;
       if (state?.task !== message.task && document.activeElement !== task && message.task !== "")
         task.value = message.task;
       if (hasLost(message) && message.last !== state?.last)
         note(engine.state, "error", `Episode: ${message.last}`, Date.now());
+      else if (isSettled && message.phase === "idle" && message.last !== "")
+        note(engine.state, "info", `Episode: ${message.last}`, Date.now());
       const isSame = state?.phase === "open" && state.episode === message.episode;
       if (message.phase === "open" && !isSame) beganMs = state === null ? null : performance.now();
       [state, heardMs] = [message, performance.now()];
@@ -211,7 +215,7 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
         return;
       }
       const records = recording?.state === "recording" || recording?.state === "failed";
-      setHidden(element, !may() || (!records && state.phase === "idle" && !hasLost(state)));
+      setHidden(element, !may() || (!records && state.phase === "idle" && !hasLost(state) && left === null));
       if (element.hidden) return;
       const current = state;
       // The console's clock may be another: it counts only where the page came later.

@@ -16,21 +16,12 @@ from typing import Literal, NamedTuple
 
 from lockstep.protocol.episodes import EpisodeCut, EpisodeOutcome, EpisodePhase, EpisodeReason
 from lockstep.protocol.serial import event_gap
-from lockstep.server.recording.episodes.episode_history import EpisodeHistory
+from lockstep.server.recording.episodes.episode_history import CUT_WORDS, EpisodeHistory
 from lockstep.server.recording.episodes.next_episode import NextEpisode
 from lockstep.server.recording.episodes.open_episode import OpenEpisode, Place
 from lockstep.server.recording.format.records import EpisodeRecord
 
 __all__ = ["Effect", "Ended", "EpisodeCore", "EpisodeRefused", "RunReset", "Write"]
-
-CUT_WORDS: dict[EpisodeCut, str] = {
-    "epoch": "the robot bridge was restarted",
-    "link_down": "the robot link was lost",
-    "recording_ended": "the recording ended",
-    "recording_failed": "the recording failed",
-    "new_part": "the recording went on in another file",
-    "console_ended": "the console ended",
-}
 
 
 class EpisodeRefused(Exception):
@@ -185,7 +176,7 @@ class EpisodeCore:
         if current.is_keeping and why not in ("recording_failed", "new_part"):
             return []
         self.current = None
-        self.history.cut(current.number, why, CUT_WORDS[why])
+        self.history.cut(current.number, why)
         if current.is_keeping:
             return [Ended("cut")]
         return [Write(current.record("cut", place._replace(epoch=current.epoch), "", why=why)), Ended("cut")]

@@ -4,7 +4,16 @@ from typing import Literal
 
 from lockstep.protocol.episodes import EpisodeCut
 
-__all__ = ["EpisodeHistory"]
+__all__ = ["CUT_WORDS", "EpisodeHistory"]
+
+CUT_WORDS: dict[EpisodeCut, str] = {
+    "epoch": "the robot bridge was restarted",
+    "link_down": "the robot link was lost",
+    "recording_ended": "the recording ended",
+    "recording_failed": "the recording failed",
+    "new_part": "the recording went on in another file",
+    "console_ended": "the console ended",
+}
 
 
 class EpisodeHistory:
@@ -40,11 +49,32 @@ class EpisodeHistory:
         self.discarded += 1
         self.last, self.lost = f"episode {number} is discarded", ""
 
-    def cut(self, number: int, why: EpisodeCut, words: str) -> None:
-        """Something else than a person ended the episode; `words` say why."""
+    def cut(self, number: int, why: EpisodeCut) -> None:
+        """Something else than a person ended the episode."""
         self.cuts += 1
-        self.last, self.lost = f"episode {number} is lost: {words}", why
+        self.last, self.lost = _lost_words(number, why), why
+
+    def begin_after(self, number: int, end: str, why: EpisodeCut) -> None:
+        """Say what became of an episode that an earlier process has recorded, unless there is a newer one.
+
+        It is in no count.
+
+        Args:
+            end: "kept", "discarded", or another word: it is lost
+            why: it is lost
+        """
+        if self.number or self.last:
+            return
+        self.number = number
+        if end in ("kept", "discarded"):
+            self.last, self.lost = f"episode {number} is {end}", ""
+        else:
+            self.last, self.lost = _lost_words(number, why), why
 
     def cancel(self, why: str) -> None:
         """The episode was cancelled before it began; `why`: in words, or ""."""
         self.last, self.lost = f"cancelled before it began: {why}".rstrip(": "), ""
+
+
+def _lost_words(number: int, why: EpisodeCut) -> str:
+    return f"episode {number} is lost: {CUT_WORDS[why]}"

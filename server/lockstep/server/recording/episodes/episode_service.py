@@ -17,6 +17,7 @@ from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.audit.records import Actor
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer_registry import PeerRegistry
+from lockstep.server.recording.episodes.episode_before import EpisodeBefore
 from lockstep.server.recording.episodes.episode_core import (
     Effect,
     Ended,
@@ -55,6 +56,22 @@ NEWS_TICKS = 10  # between two messages while an episode is open
 ASKS, ASK_RATE = 20, 4.0  # Hz, of one link
 
 Answer = Callable[[EpisodeReason, str, str], None]  # reason, detail, episode
+
+
+class _WaitingForDisk:
+    """Who is answered when an episode is on the disk, or cannot be."""
+
+    def __init__(self) -> None:
+        self._waiting: list[tuple[str, Answer]] = []
+
+    def add(self, episode: str, answer: Answer) -> None:
+        self._waiting.append((episode, answer))
+
+    def answer(self, episode: str, reason: EpisodeReason, detail: str) -> None:
+        mine = [answer for each, answer in self._waiting if each == episode]
+        self._waiting = [each for each in self._waiting if each[0] != episode]
+        for answer in mine:
+            answer(reason, detail, episode)
 
 
 class EpisodeService:
@@ -100,8 +117,9 @@ class EpisodeService:
         )
         self._checks = SessionChecks(robot, recorder, recorded, recording.free_bytes)
         self._since = 0.0  # s since 1970
+        self._reads_recordings = True  # of earlier processes
         self._asks = RateLimits(ASK_RATE, ASKS)
-        self._waiting: list[tuple[str, Answer]] = []  # for an episode to be on the disk
+        self._waiting = _WaitingForDisk()
         recorder.watched_by(self)
 
     def subscribe(self, events: SessionEvents) -> None:
@@ -156,6 +174,7 @@ class EpisodeService:
             cut=history.cuts,
             last=history.last,
             lost=history.lost,
+            reads_recordings=self._reads_recordings,
             reset_action=self._reset.name,
             problems=self._checks.problems if core.phase == "open" else [],
         )
@@ -203,7 +222,7 @@ class EpisodeService:
             answer(refused.reason, refused.detail, episode)
             return
         if request.do == "keep":
-            self._waiting.append((episode, answer))
+            self._waiting.add(episode, answer)
         if request.do in ("start", "redo"):
             self._begins_for = by.link, expires
         self._act(effects)
@@ -215,6 +234,13 @@ class EpisodeService:
 
     # RecordingWatcher
 
+    def recordings_read(self, before: EpisodeBefore | None) -> None:
+        self._reads_recordings = False
+        if before is not None:
+            self._core.history.begin_after(before.number, before.end, before.why)
+            self._core.task = self._core.task or printable(before.task)
+        self._tell()
+
     def recording_ends(self, failure: str) -> None:
         self._cut("recording_failed" if failure else "recording_ended")
 
@@ -224,7 +250,7 @@ class EpisodeService:
             return
         if kept:
             self._act(self._core.on_disk(episode, time.monotonic()), before=before)
-            self._answer_waiting(episode, "", "")
+            self._waiting.answer(episode, "", "")
         else:
             self._cut("new_part")
 
@@ -242,7 +268,7 @@ class EpisodeService:
         place = self._place.at_epoch_end() if why == "epoch" else self._place.now()
         self._act(self._core.cut(why, place), before=before)
         if self._core.episode != episode:
-            self._answer_waiting(episode, "not_written", self._core.history.last)
+            self._waiting.answer(episode, "not_written", self._core.history.last)
 
     # acting
 
@@ -261,12 +287,6 @@ class EpisodeService:
                     self._events.publish(EpisodeEnded(end))
         if tells and (before is None or before != self._core.phase):
             self._tell()
-
-    def _answer_waiting(self, episode: str, reason: EpisodeReason, detail: str) -> None:
-        mine = [answer for each, answer in self._waiting if each == episode]
-        self._waiting = [each for each in self._waiting if each[0] != episode]
-        for answer in mine:
-            answer(reason, detail, episode)
 
     def _tell(self) -> None:
         self._peers.announce(self.state())

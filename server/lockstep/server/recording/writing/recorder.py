@@ -15,6 +15,7 @@ from lockstep.server.errors import AlreadyRecording, RecordingFailed
 from lockstep.server.event_clock import EventClock
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.recorded_encoding import FrameTaker
+from lockstep.server.recording.episodes.episode_before import EpisodeBefore
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.signature import RecordingSigning
 from lockstep.server.recording.format.topics import PICTURE_FORMATS
@@ -45,6 +46,9 @@ class RecordedMedia(Protocol):
 
 class RecordingWatcher(Protocol):
     """Is told of what concerns episodes. All methods are called on the loop and return at once."""
+
+    def recordings_read(self, before: EpisodeBefore | None) -> None:
+        """What earlier processes have recorded is complete by now; `before` is the last episode of it."""
 
     def recording_ends(self, failure: str) -> None:
         """The recording ends; without a failure what is put into it now is still written."""
@@ -102,7 +106,9 @@ class Recorder:
         """Run until cancelled; the file is closed then."""
         self._loop = asyncio.get_running_loop()
         try:
-            await self._retention.prepare()
+            before = await self._retention.prepare()
+            if self._watcher is not None:
+                self._watcher.recordings_read(before)
             ticks = 0
             while True:
                 if self._settings.automatic and self._thread is None and time.monotonic() >= self._again_at:
