@@ -16,9 +16,9 @@ from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
 from lockstep.robot_bridge.control.goals.measured_axes import MeasuredAxes
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
-from lockstep.robot_bridge.control.tick_alarm import TickAlarm
-from lockstep.robot_bridge.control.tick_loop import TickLoop
-from lockstep.robot_bridge.control.work_ahead import WorkAhead
+from lockstep.robot_bridge.control.ticks.tick_alarm import TickAlarm
+from lockstep.robot_bridge.control.ticks.tick_loop import TickLoop
+from lockstep.robot_bridge.control.ticks.work_ahead import WorkAhead
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.description.check_axes import check_braking
 from lockstep.robot_bridge.description.check_description import check_description

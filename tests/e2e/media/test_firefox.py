@@ -7,7 +7,7 @@ from lockstep.bench.browsers.sound_card import SoundCard
 from lockstep.emulator import Network
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.full_rate]
+pytestmark = [pytest.mark.browser, pytest.mark.full_rate, pytest.mark.timeout(300)]
 
 TONE = 440.0  # Hz, what the planar robot plays
 STATS = "window.lockstep.stats()"

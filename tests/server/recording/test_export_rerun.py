@@ -18,6 +18,7 @@ from lockstep.server.recording.writing.writer import RecordingWriter
 from lockstep.server.scene.kinematics import body_pose
 from tests.server.recording.makers import EPOCH, INFO, INTERVAL, SECOND, START, Story, own_entry, rewritten
 from tests.server.recording.rrd import entities, recording_ids, rerun
+from tests.server.recording.test_episode_export import KEPT_AND_NOT, recording
 
 from lockstep.server.recording.export import export_rerun  # isort: skip  (needs rerun, which `rrd` looks for)
 
@@ -182,3 +183,14 @@ def test_a_command_that_was_refused_is_no_row(tmp_path: Path) -> None:
     writer.close()
     (target,) = export_rerun.export(path, None, "")
     assert entities(target)["/axes/commanded"].rows == []
+
+
+def test_with_kept_a_file_has_nothing_of_what_is_in_no_kept_episode(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    (target,) = export_rerun.export(path, tmp_path / "a.rrd", "", kept=True)
+    found = entities(target)
+    kept = [*range(11, 21), *range(46, 61)]
+    assert found["/axes/measured"].column("event") == kept
+    for name, entity in found.items():
+        said = {1, 10, 45} if name == "/log" else set()  # what the robot is, and begins of the kept ones
+        assert set(entity.column("event")) <= {*kept, *said}, name

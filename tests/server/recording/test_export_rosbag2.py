@@ -17,7 +17,14 @@ from lockstep.protocol.maps import OccupancyMap
 from lockstep.protocol.messages import Feedback
 from lockstep.robot_bridge.robots.registry import create_robot
 from lockstep.server.recording.errors import RecordingDamaged
-from lockstep.server.recording.format.records import Degraded, FeedbackRecord, MapRecord, NavigationRecord, RobotRecord
+from lockstep.server.recording.format.records import (
+    Degraded,
+    EpisodeRecord,
+    FeedbackRecord,
+    MapRecord,
+    NavigationRecord,
+    RobotRecord,
+)
 from lockstep.server.recording.format.robot_frames import WORLD
 from lockstep.server.recording.format.topics import CAMERA, OWN_TOPICS
 from lockstep.server.recording.reading.reader import RecordingReader
@@ -25,6 +32,7 @@ from lockstep.server.recording.writing.queue_items import FeedbackItem, RobotIte
 from lockstep.server.recording.writing.writer import Entry, RecordingWriter
 from lockstep.server.scene.kinematics import body_pose
 from tests.server.recording.makers import EPOCH, INFO, INTERVAL, SECOND, START, Story, own_entry, rewritten
+from tests.server.recording.test_episode_export import KEPT_AND_NOT, changed, recording
 from tests.support.ros2 import have_ros, ros_python
 
 pytest.importorskip("rosbags")
@@ -271,3 +279,24 @@ def test_the_map_is_an_occupancy_grid_whose_frame_is_placed_in_the_world(tmp_pat
     (transform,) = frames.decoded.transforms
     assert (transform.header.frame_id, transform.child_frame_id) == (WORLD, "map")
     assert (transform.transform.translation.x, transform.transform.translation.y) == (-1.0, -0.5)
+
+
+def test_with_kept_a_bag_has_nothing_of_what_is_in_no_kept_episode(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    changed(path, "c", last_event=55)
+    (bag,) = export_rosbag2.export(path, tmp_path / "bag", "", kept=True)
+    found = read(bag)
+    kept = {*range(11, 21), *range(46, 56)}
+    feedback = [json.loads(each.decoded.data)["event"] for each in found[OWN_TOPICS[FeedbackRecord]]]
+    assert set(feedback) == kept
+    assert len(found["/joint_states"]) == len(feedback)
+    stamps = [json.loads(each.decoded.data)["event"] for each in found["/lockstep/stamp"]]
+    assert stamps
+    assert set(stamps) <= kept
+    assert len(found["/camera/front"]) == len(stamps)
+    decoder = av.CodecContext.create("h264", "r")
+    for each in found["/camera/front"]:
+        decoder.decode(av.Packet(bytes(each.decoded.data)))  # what it builds on is there
+    episodes = {json.loads(each.decoded.data)["episode"] for each in found[OWN_TOPICS[EpisodeRecord]]}
+    assert episodes == {"a", "c"}
+    assert set(found) <= set(read(export_rosbag2.export(path, tmp_path / "whole", "")[0]))

@@ -53,13 +53,19 @@ class Firefox:
         return found
 
     async def _ask(self, verb: str, **arguments: object) -> Any:
-        if self._process.stdin is None or self._process.stdout is None:
+        if self._process.stdin is None:
             raise RuntimeError("the driver has no pipes")
         self._process.stdin.write(json.dumps({"verb": verb, **arguments}).encode() + b"\n")
         await self._process.stdin.drain()
+        return await self.answer(verb)
+
+    async def answer(self, verb: str) -> Any:
+        """Return the next answer of the driver, which is of `verb`. Raises RuntimeError: it failed, or has ended."""
+        if self._process.stdout is None:
+            raise RuntimeError("the driver has no pipes")
         line = await self._process.stdout.readline()
         if not line:
-            raise RuntimeError("the Firefox driver ended")
+            raise RuntimeError(f"the Firefox driver ended ({verb})")
         answer = json.loads(line)
         if "error" in answer:
             raise RuntimeError(f"{verb}: {answer['error']}")
@@ -68,7 +74,11 @@ class Firefox:
 
 @asynccontextmanager
 async def running_firefox(environment: dict[str, str] | None = None) -> AsyncIterator[Firefox]:
-    """Start a headless Firefox with one empty page and its own profile; close it on leaving."""
+    """Start a headless Firefox with one empty page and its own profile; close it on leaving.
+
+    Raises:
+        RuntimeError: Firefox is not installed, or does not begin.
+    """
     executable = shutil.which("firefox-esr") or shutil.which("firefox")
     if executable is None:
         raise RuntimeError("Firefox is not installed: make test installs Debian's firefox-esr")
@@ -80,7 +90,9 @@ async def running_firefox(environment: dict[str, str] | None = None) -> AsyncIte
         env=environment,
     )
     try:
-        yield Firefox(process)
+        browser = Firefox(process)
+        await browser.answer("begin")
+        yield browser
     finally:
         if process.stdin is not None:
             process.stdin.close()

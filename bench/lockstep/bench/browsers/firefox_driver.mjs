@@ -1,4 +1,5 @@
-// Drives Firefox through WebDriver BiDi for Python: one JSON request a line in, one answer a line out.
+// Drives Firefox through WebDriver BiDi for Python: one JSON request a line in, one answer a line out. The first line is
+// the answer to nothing, once Firefox has begun.
 import { createInterface } from "node:readline";
 import { createRequire } from "node:module";
 
@@ -9,6 +10,7 @@ const browser = await puppeteer.launch({
   browser: "firefox",
   executablePath: process.argv[2],
   headless: true,
+  timeout: 120_000, // ms: read from a cold disk beside other work, it takes more than half a minute to begin
   args: ["--no-sandbox"],
   extraPrefsFirefox: {
     "media.autoplay.default": 0,
@@ -44,6 +46,7 @@ async function waitFor(expression, timeout) {
   return null;
 }
 
+console.log(JSON.stringify({ value: null }));
 for await (const line of createInterface({ input: process.stdin })) {
   const request = JSON.parse(line);
   try {

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from lockstep.protocol.description import Axis
-from lockstep.robot_bridge.control.tick_loop import MAX_CATCH_UP
+from lockstep.robot_bridge.control.ticks.tick_loop import MAX_CATCH_UP
 from lockstep.robot_bridge.robots.so101.controls import JOINT_AXES, RATES
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.records import FeedbackRecord, RefusalRecord, RobotRecord

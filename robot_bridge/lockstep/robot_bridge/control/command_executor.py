@@ -16,7 +16,7 @@ from lockstep.robot_bridge.control.goals.taken_up_goals import TakenUpGoals
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
 from lockstep.robot_bridge.control.start_signal import StartSignal
-from lockstep.robot_bridge.control.tick_alarm import TickAlarm
+from lockstep.robot_bridge.control.ticks.tick_alarm import TickAlarm
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.event_log import EventLog
 from lockstep.robot_bridge.link.link_server import LinkPeer

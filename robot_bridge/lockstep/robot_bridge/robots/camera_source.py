@@ -7,7 +7,7 @@ from typing import Generic, TypeVar
 
 from lockstep.protocol.description import Camera
 from lockstep.protocol.messages import Media
-from lockstep.robot_bridge.control.ticker import Ticker
+from lockstep.robot_bridge.control.ticks.ticker import Ticker
 from lockstep.robot_bridge.robots.base import MediaSource, Stamp
 
 __all__ = ["CameraSource"]

@@ -7,7 +7,7 @@ from typing import Final
 
 from lockstep.protocol.description import Microphone
 from lockstep.protocol.messages import Media
-from lockstep.robot_bridge.control.ticker import Ticker
+from lockstep.robot_bridge.control.ticks.ticker import Ticker
 from lockstep.robot_bridge.robots.base import MediaSource, Stamp
 
 __all__ = ["SEGMENT_SECONDS", "MicrophoneSource"]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from lockstep.protocol.description import AxisGain
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
-from lockstep.robot_bridge.control.ticker import Ticker
+from lockstep.robot_bridge.control.ticks.ticker import Ticker
 from tests.robot_bridge.control.limits.limits_helpers import (
     DT,
     HOLD,

@@ -128,14 +128,14 @@ def test_an_export_says_what_it_wrote_beside_the_recording(directory: Path, kind
     assert (directory / written).stat().st_size > 0
 
 
-def test_tables_alone_leave_out_what_is_of_no_kept_episode(directory: Path) -> None:
+def test_an_export_leaves_out_what_is_of_no_kept_episode_if_asked_to(directory: Path) -> None:
     done = _lockstep(directory, "export", "one", "--to", "csv", "--kept")
     assert done.exit_code == 0, done.output
     assert len((directory / "one.csv").read_text().splitlines()) == 1, "without an episode only the head is left"
     for other in ("mp4", "lerobot"):
         refused = _lockstep(directory, "export", "one", "--to", other, "--kept")
         assert refused.exit_code == 2
-        assert "--kept is for csv and parquet" in refused.stderr
+        assert "--kept is for csv, parquet, rerun and rosbag2" in refused.stderr
 
 
 def test_a_dataset_goes_where_it_is_told(directory: Path, tmp_path: Path) -> None:

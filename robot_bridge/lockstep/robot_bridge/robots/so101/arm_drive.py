@@ -33,7 +33,7 @@ class _Tool(NamedTuple):
     vector: Array  # rad, the rotation as a vector
 
 
-class _Goal(NamedTuple):
+class _ToolGoal(NamedTuple):
     """Of the tool."""
 
     position: Array
@@ -57,7 +57,7 @@ class ArmDrive:
         self._goals = tuple(posture)
         self._before: tuple[float, ...] | None = None  # values of the tick before
         self._joints: tuple[float, ...] | None = None  # goals of the joints while they are driven
-        self._pose: _Goal | None = None  # while the tool is driven
+        self._pose: _ToolGoal | None = None  # while the tool is driven
         self._motion = np.zeros(6)  # m/s and rad/s, of that goal in the present tick
         self._solved = (0.0,) * self._count  # rad/s, in the last tick for the tool
         self._still = math.inf  # s since the pose's goal changed or was pursued
@@ -156,7 +156,7 @@ class ArmDrive:
             self._joints, self._pose = joints, None
             self.faults = []
         elif begins or _differ(pose, before[self._count :]):
-            goal = _Goal(np.array(pose[:3]), from_rotation_vector(pose[3:]))
+            goal = _ToolGoal(np.array(pose[:3]), from_rotation_vector(pose[3:]))
             if self._pose is None:  # in the first tick the goal was read anew, which is no motion
                 self._solved = (0.0,) * self._count
                 self._turns = True
@@ -165,7 +165,7 @@ class ArmDrive:
             self._joints, self._pose = None, goal
             self._still = 0.0
 
-    def _follow_pose(self, pose: _Goal, seconds: float) -> None:
+    def _follow_pose(self, pose: _ToolGoal, seconds: float) -> None:
         share = min(max((SETTLES - self._still) / SLOWS, 0.0), 1.0)
         self._still += seconds
         if share == 0.0:  # the bridge reads its goals anew, from here
@@ -202,7 +202,7 @@ def _differ(values: tuple[float, ...], others: tuple[float, ...]) -> bool:
     return values != others and any(abs(value - other) > SAME for value, other in zip(values, others, strict=True))
 
 
-def _motion(before: _Goal, after: _Goal) -> Array:
+def _motion(before: _ToolGoal, after: _ToolGoal) -> Array:
     """Return the way between two goals, m, and the turn, rad as a rotation vector."""
     turn = rotation_vector(after.rotation @ before.rotation.T)
     return np.concatenate((after.position - before.position, turn))

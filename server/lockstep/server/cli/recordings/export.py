@@ -28,7 +28,7 @@ __all__ = ["add_export_command"]
 
 EXTRAS = ("wrench", "ranges")
 DATASET = "lerobot: "
-TABLES = (ExportFormat.CSV, ExportFormat.PARQUET)
+HAVE_KEPT = (ExportFormat.CSV, ExportFormat.PARQUET, ExportFormat.RERUN, ExportFormat.ROSBAG2)
 
 
 def add_export_command(app: typer.Typer, make_settings: MakeSettings) -> None:
@@ -65,7 +65,7 @@ def add_export_command(app: typer.Typer, make_settings: MakeSettings) -> None:
             typer.Option("--whole", help=DATASET + "take each file without episodes as one in any case."),
         ] = False,
         kept: Annotated[
-            bool, typer.Option("--kept", help="csv, parquet: without the rows of no kept episode.")
+            bool, typer.Option("--kept", help="csv, parquet, rerun, rosbag2: without what is of no kept episode.")
         ] = False,
         append: Annotated[bool, typer.Option("--append", help=DATASET + "append what the dataset has not.")] = False,
         follow: Annotated[
@@ -81,8 +81,8 @@ def add_export_command(app: typer.Typer, make_settings: MakeSettings) -> None:
         """Write recordings in another form; lerobot: the kept episodes of all of them as one dataset."""
         settings = make_settings(state_dir=state_dir)
         paths = [recording_file(file, settings, robot, directory) for file in files or []]
-        if kept and to not in TABLES:
-            raise usage_error("--kept is for csv and parquet; lerobot has kept episodes alone")
+        if kept and to not in HAVE_KEPT:
+            raise usage_error("--kept is for csv, parquet, rerun and rosbag2; lerobot has kept episodes alone")
         only = options.filter()
         if to is ExportFormat.LEROBOT:
             store = recording_store(settings, robot, directory)

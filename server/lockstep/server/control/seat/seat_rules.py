@@ -37,7 +37,7 @@ class SeatRules:
         if role == "policy":
             return self._request_by_policy(peer, now)
         if role not in PEOPLE:
-            return SeatOutcome(refusal=SeatRefusal(peer, "not_allowed"))
+            return SeatOutcome(refusal=SeatRefusal(peer, "not_allowed", "this link watches; an operator's link drives"))
         what = SeatInput.REQUEST_IF_FREE if only_if_free else SeatInput.REQUEST
         if what is SeatInput.REQUEST and self.seat.standing(peer) is Standing.POLICY:
             what = SeatInput.TAKE

@@ -3,10 +3,12 @@
 from pathlib import Path
 
 from lockstep.server.recording.errors import RecordingDamaged
+from lockstep.server.recording.export.lerobot_rows import episodes_now
 from lockstep.server.recording.export.rerun.session_log import Moment, SessionLog, new_stream
 from lockstep.server.recording.export.unfinished import unfinished_file
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.topics import CAMERA, OWN_TOPICS, SIGNATURE, WRENCH
+from lockstep.server.recording.reading.kept_records import KeptRecords
 from lockstep.server.recording.reading.reader import RecordingReader
 
 __all__ = ["export"]
@@ -14,8 +16,12 @@ __all__ = ["export"]
 READ = set(OWN_TOPICS.values()) - {SIGNATURE, WRENCH}
 
 
-def export(path: Path, out: Path | None, task: str) -> list[Path]:
-    """Write and return the file: `out`, or one beside `path`. Raises RecordingError, OSError."""
+def export(path: Path, out: Path | None, task: str, *, kept: bool = False) -> list[Path]:
+    """Write and return the file: `out`, or one beside `path`. `kept`: what is of kept episodes alone.
+
+    Raises:
+        RecordingError, OSError: it cannot be read or written.
+    """
     target = out or path.with_suffix(".rrd")
     with (
         RecordingReader(path) as reader,
@@ -25,7 +31,7 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
         stream = new_stream(reader.info.recording, reader.info.epoch)
         stream.save(str(partial))
         try:
-            _write(reader, SessionLog(stream))
+            _write(reader, SessionLog(stream), KeptRecords(episodes_now(reader)) if kept else None)
             stream.flush()
         except (OverflowError, ValueError) as error:
             raise RecordingDamaged(f"{path.name}: Rerun has no such value: {error}") from error
@@ -34,9 +40,12 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
     return [target]
 
 
-def _write(reader: RecordingReader, session: SessionLog) -> None:
+def _write(reader: RecordingReader, session: SessionLog, only: KeptRecords | None) -> None:
     session.begin(reader.description())
     for record in reader.records():
+        if only is not None and not only.takes(record):
+            session.leave_out(record.topic)
+            continue
         at = Moment(record.event, record.arrived, record.captured)
         if record.topic.startswith(CAMERA):
             picture = record.picture

@@ -25,6 +25,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.errors import MessageError
 from lockstep.server.recording.errors import RecordingDamaged
+from lockstep.server.recording.export.lerobot_rows import episodes_now
 from lockstep.server.recording.export.rosbag2.ros_messages import COMPRESSED_VIDEO, RosMessages, ros_types
 from lockstep.server.recording.export.unfinished import unfinished
 from lockstep.server.recording.format.map_messages import MAP_FRAME
@@ -32,6 +33,7 @@ from lockstep.server.recording.format.payload import VIDEO, RecordedPicture, own
 from lockstep.server.recording.format.records import Degraded, FeedbackRecord, MapRecord, NavigationRecord, RobotRecord
 from lockstep.server.recording.format.stamp import STAMP_TOPIC, stamp_message
 from lockstep.server.recording.format.topics import CAMERA, OWN_TOPICS, SIGNATURE, WRENCH, has_frames, stream_of
+from lockstep.server.recording.reading.kept_records import KeptRecords
 from lockstep.server.recording.reading.pictures import picture_size
 from lockstep.server.recording.reading.reader import Record, RecordingReader
 from lockstep.server.recording.writing.writer import Entry
@@ -49,8 +51,8 @@ NOT_BOUNDED = QosTime(2147483647, 4294967295)
 MOST_NAME = 60  # characters of a camera's name in a topic
 
 
-def export(path: Path, out: Path | None, task: str) -> list[Path]:
-    """Write and return the bag, a folder: `out`, or one beside `path`.
+def export(path: Path, out: Path | None, task: str, *, kept: bool = False) -> list[Path]:
+    """Write and return the bag, a folder: `out`, or one beside `path`. `kept`: what is of kept episodes alone.
 
     Raises:
         RecordingError: the recording cannot be read.
@@ -67,8 +69,12 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
                 Writer(partial, version=VERSION, storage_plugin=StoragePlugin.MCAP) as writer,
             ):
                 bag = _Bag(writer, reader, description)
+                only = KeptRecords(episodes_now(reader)) if kept else None
                 for record in reader.records():
-                    bag.take(record)
+                    if only is None or only.takes(record):
+                        bag.take(record)
+                    else:
+                        bag.leave_out(record)
         except CANNOT_BE_WRITTEN as error:
             raise RecordingDamaged(f"{path.name}: ROS 2 has no such value: {error}") from error
     return [target]
@@ -107,6 +113,13 @@ class _Bag:
             elif record.topic == ROBOT and has_frames(self._description):
                 message = self._messages.fixed_transforms(self._description, record.captured)
                 self._write("/tf_static", "tf2_msgs/msg/TFMessage", record.arrived, message)
+
+    def leave_out(self, record: Record) -> None:
+        """Take no notice of a record, but that later pictures may build on it."""
+        if record.topic == DEGRADED:
+            self._whole.clear()
+        else:
+            self._whole.discard(record.topic.removeprefix(CAMERA))
 
     def _picture(self, record: Record, picture: RecordedPicture) -> None:
         camera = record.topic.removeprefix(CAMERA)

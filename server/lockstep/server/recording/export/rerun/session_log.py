@@ -12,11 +12,13 @@ from lockstep.server.recording.export.rerun.columns import Columns, Moment
 from lockstep.server.recording.export.rerun.further_records import FurtherRecords
 from lockstep.server.recording.format.records import CommandRecord, Degraded, FeedbackRecord, OwnRecord
 from lockstep.server.recording.format.records_in_words import in_words
+from lockstep.server.recording.format.topics import CAMERA, OWN_TOPICS
 from lockstep.server.scene.kinematics import body_pose
 
 __all__ = ["APPLICATION", "Moment", "SessionLog", "new_stream"]
 
 APPLICATION = "lockstep"
+DEGRADED = OWN_TOPICS[Degraded]
 LOG = "/log"
 JOINTS = "/joints"
 MEASURED, COMMANDED, GOALS = "/axes/measured", "/axes/commanded", "/axes/goals"
@@ -115,6 +117,13 @@ class SessionLog:
         if self._event:
             self.columns.scalars(entity(GAP, camera), at, [event_gap(self._event, at.event)])
         self._make_room()
+
+    def leave_out(self, topic: str) -> None:
+        """Take no notice of a record of this topic, but that later pictures may build on it."""
+        if topic == DEGRADED:
+            self._whole.clear()
+        else:
+            self._whole.discard(topic.removeprefix(CAMERA))
 
     def flush(self) -> None:
         """Hand all rows to Rerun. Blocks while its sink has no room."""

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from lockstep.robot_bridge.control.tick_alarm import TickAlarm
-from lockstep.robot_bridge.control.work_ahead import WorkAhead
+from lockstep.robot_bridge.control.ticks.tick_alarm import TickAlarm
+from lockstep.robot_bridge.control.ticks.work_ahead import WorkAhead
 from lockstep.robot_bridge.link.sending.link_publisher import LinkPublisher
 from tests.robot_bridge.bridge_helpers import DRIVE, PATIENCE, RecordingRobot, log_lines, operator, running_bridge
 

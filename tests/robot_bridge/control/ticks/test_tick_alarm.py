@@ -1,6 +1,6 @@
 import asyncio
 
-from lockstep.robot_bridge.control.tick_alarm import TickAlarm
+from lockstep.robot_bridge.control.ticks.tick_alarm import TickAlarm
 
 LONG = 3600.0  # s: only a ring ends such a wait within a test
 TURN = 0.001  # s

@@ -2,7 +2,7 @@ import random
 
 import pytest
 
-from lockstep.robot_bridge.control.ticker import Ticker
+from lockstep.robot_bridge.control.ticks.ticker import Ticker
 
 
 def test_beats_do_not_drift_when_each_wait_ends_late() -> None:

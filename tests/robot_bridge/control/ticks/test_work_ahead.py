@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import pytest
 
-from lockstep.robot_bridge.control import work_ahead
 from lockstep.robot_bridge.control.goals.measured_axes import MeasuredAxes
-from lockstep.robot_bridge.control.work_ahead import MOST_SLOW, SLOW, WorkAhead
+from lockstep.robot_bridge.control.ticks import work_ahead
+from lockstep.robot_bridge.control.ticks.work_ahead import MOST_SLOW, SLOW, WorkAhead
 from tests.robot_bridge.control.goals.goal_helpers import HangingArm
 
 

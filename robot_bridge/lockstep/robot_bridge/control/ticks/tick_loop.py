@@ -16,9 +16,9 @@ from lockstep.robot_bridge.control.clock import Clock
 from lockstep.robot_bridge.control.coming_to_rest import ComingToRest
 from lockstep.robot_bridge.control.command_executor import CommandExecutor
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
-from lockstep.robot_bridge.control.tick_alarm import TickAlarm
-from lockstep.robot_bridge.control.ticker import Ticker
-from lockstep.robot_bridge.control.work_ahead import WorkAhead
+from lockstep.robot_bridge.control.ticks.tick_alarm import TickAlarm
+from lockstep.robot_bridge.control.ticks.ticker import Ticker
+from lockstep.robot_bridge.control.ticks.work_ahead import WorkAhead
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.errors import RobotFailed, RobotUnavailable, named
 from lockstep.robot_bridge.link.sending.link_publisher import LinkPublisher
