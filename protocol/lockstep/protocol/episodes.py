@@ -106,6 +106,7 @@ class EpisodeState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", 
     cut: Count = 0  # ended by something else than a person; they are in no dataset
     last: str = ""  # what became of the last one, in words
     lost: EpisodeCut | Literal[""] = ""  # why the last one was lost; "": it was not
-    reads_recordings: bool = False  # of before the console's start: what became of the last episode is not known yet
+    last_episode: str = ""  # id of that one; "": it did not begin
+    reads_recordings: bool = False  # the console still reads what earlier processes recorded, and cannot say `last` yet
     reset_action: str = ""  # name of the robot's action that is run between episodes; "" for none
     problems: list[EpisodeProblem] = []

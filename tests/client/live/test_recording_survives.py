@@ -37,7 +37,7 @@ async def test_a_killed_consoles_recording_opens_and_is_completed(tmp_path: Path
     executed = {each["event"]: each["time"] for each in log if each["kind"] == "executed"}
     latest = max(executed.values())
     assert before.last_event >= max(event for event, at in executed.items() if at < latest - LOST - SLOW or event == 2)
-    assert len(RecordingStore(directory, RecordingSettings()).recover()) == 1
+    assert RecordingStore(directory, RecordingSettings()).recover() == 1
     verdict = verify_file(path)
     assert [name for name, check in verdict.checks.items() if not check.ok] == ["signed"], "it has no closing signature"
     assert verdict.signature.state == "open"

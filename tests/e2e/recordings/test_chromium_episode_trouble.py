@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
+import httpx
 import pytest
 from playwright.async_api import Browser, Locator, expect
 
@@ -20,6 +21,8 @@ from lockstep.bench.harness.driving import drive_on
 from lockstep.bench.harness.processes import started
 from lockstep.bench.harness.stack import running_bridge
 from lockstep.client import Console
+from lockstep.client.console_url import parse_link
+from lockstep.emulator import Network
 from lockstep.robot_bridge.robots.so101.model_source import FOLDER_VARIABLE
 from lockstep.server.recording.reading.reader import RecordingReader
 from tests.client.live.test_policies import policy_link
@@ -27,13 +30,14 @@ from tests.e2e.accessibility import findings
 from tests.e2e.recordings.test_chromium_episodes import SETTINGS
 from tests.e2e.so101 import SO101, needs_so101
 from tests.support.stack import Stack, running_console, running_stack
-from tests.waiting import PATIENCE
+from tests.waiting import PATIENCE, eventually
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(240)]
 
 SHOTS = os.environ.get("EPISODE_SHOTS", "")  # directory for pictures of the page, for people to look at
 DISK_BYTES = 64 << 20
 KEEPS_FREE = 16 << 20
+OUTAGE_SECONDS = 20.0
 
 
 @asynccontextmanager
@@ -135,6 +139,8 @@ async def test_the_page_says_what_became_of_an_episode_when_the_console_is_kille
             await bar.locator(".episode-task").fill("push the box")
             await bar.locator(".episode-task").press("Enter")
             await expect(words).to_contain_text("Take 1" if phase == "open" else "Begins in ")
+            if phase == "open":
+                await eventually(lambda: _states(tmp_path / "recordings") == ["open"])
             await first.running.kill()
         if phase == "open":
             await expect(words).to_have_text("Take 1: the console does not answer")
@@ -177,6 +183,28 @@ async def test_after_the_console_was_killed_the_page_says_of_a_kept_episode_what
             for each in (words, later.page.locator(".episode-words")):
                 await expect(each).to_have_text(became, timeout=60_000)
             assert not resets or became == "Episode 1 is kept"
+
+
+async def test_a_page_that_missed_that_its_episode_was_kept_is_told_by_the_next_process_of_the_console(
+    tmp_path: Path, chromium: Browser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LOCKSTEP_EPISODES__COUNTDOWN_SECONDS", "0")
+    record = ("--record", str(tmp_path / "recordings"))
+    async with running_bridge("planar") as bridge, AsyncExitStack() as closing:
+        async with running_console(tmp_path, bridge.address, bridge.event_log, record) as first:
+            network = await closing.enter_async_context(Network("micro-lan", console_url=first.console))
+            console = await closing.enter_async_context(open_console(chromium, network.link(first.operator)))
+            words = console.page.locator(".episode-words")
+            await _take_one(console, words)
+            network.outage(OUTAGE_SECONDS)
+            await expect(words).to_have_text("Take 1: the console does not answer")
+            headers = {"Authorization": f"Bearer {parse_link(first.supervisor).token}"}
+            async with httpx.AsyncClient(base_url=first.console, headers=headers, trust_env=False) as http:
+                (await http.post("/api/episode/keep", json={})).raise_for_status()
+            await first.running.kill()
+        port = first.console.rsplit(":", 1)[1]
+        async with running_console(tmp_path, bridge.address, bridge.event_log, (*record, "--port", port)):
+            await expect(words).to_have_text("Episode 1 is kept", timeout=90_000)
 
 
 async def test_the_page_says_of_an_episode_that_was_kept_as_the_bridge_was_killed_what_the_recording_says(

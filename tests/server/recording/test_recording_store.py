@@ -75,7 +75,7 @@ def test_the_file_that_is_being_written_is_neither_listed_completed_nor_deleted(
     aged(tmp_path / "running.mcap", 100)
     found = shelf(tmp_path, days=1)
     assert found.entries() == []
-    assert found.recover() == []
+    assert found.recover() == 0
     assert found.prune() == []
     writer.close()
     assert [entry.id for entry in found.entries()] == ["running"]
@@ -87,8 +87,8 @@ def test_an_interrupted_file_is_completed_once_and_one_that_holds_nothing_goes(t
     empty.write_bytes(path.read_bytes()[:600])  # the head and a part of the first chunk
     found = shelf(tmp_path)
     assert [entry.interrupted for entry in found.entries() if entry.id == "killed"] == [True]
-    assert found.recover() == [path]
-    assert found.recover() == []
+    assert found.recover() == 1
+    assert found.recover() == 0
     assert not empty.exists()
     with RecordingReader(path) as reader:
         assert not reader.interrupted
@@ -200,7 +200,7 @@ def test_a_link_to_what_is_elsewhere_is_neither_listed_nor_completed_nor_counted
     found = shelf(here, days=1)
     assert [entry.id for entry in found.entries()] == ["own"]
     assert found.path("secret") is None
-    assert found.recover() == []
+    assert found.recover() == 0
     assert other.read_bytes() == before
     (tmp_path / "link").symlink_to(here, target_is_directory=True)
     assert [entry.id for entry in shelf(tmp_path / "link").entries()] == ["own"], "the folder itself may be one"

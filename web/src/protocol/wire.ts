@@ -221,6 +221,7 @@ export interface EpisodeState {
   readonly cut: number;
   readonly last: string;
   readonly lost: "console_ended" | "epoch" | "link_down" | "new_part" | "recording_ended" | "recording_failed" | "";
+  readonly last_episode: string;
   readonly reads_recordings: boolean;
   readonly reset_action: string;
   readonly problems: readonly (EpisodeProblem)[];

@@ -82,7 +82,7 @@ export function unknownWords({ number }: Pick<EpisodeState, "number">): string {
 }
 
 function readsWords({ number }: Pick<EpisodeState, "number">): string {
-  return `take ${number}: the console reads its recordings`;
+  return `episode ${number}: the console reads its recordings`;
 }
 
 /** Whether the last episode was lost. */
@@ -140,13 +140,14 @@ export function leftEpisode(state: EpisodeState | null): LeftEpisode | null {
 }
 
 /**
- * The state with what became of that episode, where the console does not say it: another process of the console says it
- * once it has read the recordings, unless the episode is in none.
+ * The state with what is known of that episode. Another process of the console says what became of it once it has read
+ * the recordings, unless that is long ago.
  */
 export function withLeftEpisode(state: EpisodeState, left: LeftEpisode | null): EpisodeState {
-  if (left === null || state.last !== "" || state.episode === left.episode) return state;
+  if (left === null || [state.episode, state.last_episode].includes(left.episode)) return state;
   if (state.reads_recordings) return { ...state, last: readsWords(left) };
-  return { ...state, last: `episode ${left.number} is lost: the console ended`, lost: "console_ended" };
+  const last = `episode ${left.number}: the console ended, the list of episodes says whether it is kept`;
+  return { ...state, last, lost: "console_ended" };
 }
 
 function countWords({ kept, discarded, cut }: EpisodeState): string {

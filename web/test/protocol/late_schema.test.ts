@@ -10,6 +10,7 @@ const IDLE = {
     cut: 0,
     last: "",
     lost: "",
+    last_episode: "",
     reads_recordings: false,
     reset_action: "",
     problems: [],

@@ -23,6 +23,7 @@ const IDLE: EpisodeState = {
   cut: 0,
   last: "",
   lost: "",
+  last_episode: "",
   reads_recordings: false,
   reset_action: "",
   problems: [],
@@ -124,15 +125,17 @@ it("says that an episode is lost with the console", () => {
   expect(leftEpisode(IDLE)).toBeNull();
   expect(leftEpisode(null)).toBeNull();
   expect(withLeftEpisode(IDLE, left)).toMatchObject({
-    last: "episode 3 is lost: the console ended",
+    last: "episode 3: the console ended, the list of episodes says whether it is kept",
     lost: "console_ended",
   });
   const reads = withLeftEpisode({ ...IDLE, reads_recordings: true }, left);
-  expect(reads).toMatchObject({ last: "take 3: the console reads its recordings", lost: "" });
+  expect(reads).toMatchObject({ last: "episode 3: the console reads its recordings", lost: "" });
   const goesOn = { ...IDLE, phase: "open", episode: "a", number: 3 } as const;
   expect(withLeftEpisode(goesOn, left)).toEqual(goesOn);
-  const kept = { ...IDLE, last: "episode 3 is kept" };
+  const kept = { ...IDLE, last: "episode 3 is kept", last_episode: "a" };
   expect(withLeftEpisode(kept, left)).toEqual(kept);
+  const other = { ...IDLE, last: "episode 2 is kept", last_episode: "b" };
+  expect(withLeftEpisode(other, left).lost).toBe("console_ended");
   expect(withLeftEpisode(IDLE, null)).toEqual(IDLE);
 });
 

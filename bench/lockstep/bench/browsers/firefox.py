@@ -3,14 +3,16 @@
 import asyncio
 import json
 import shutil
+import signal
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 __all__ = ["Firefox", "running_firefox"]
 
 DRIVER = Path(__file__).with_name("firefox_driver.mjs")
+END_SECONDS = 20.0
 ANSWER_LIMIT = 16 << 20  # bytes in one answer line
 
 
@@ -96,5 +98,15 @@ async def running_firefox(environment: dict[str, str] | None = None) -> AsyncIte
     finally:
         if process.stdin is not None:
             process.stdin.close()
-        async with asyncio.timeout(20):
-            await process.wait()
+        await _end(process)
+
+
+async def _end(process: asyncio.subprocess.Process) -> None:
+    """Wait for the driver's end; it ends Firefox too where it is told to terminate."""
+    for number in (None, signal.SIGTERM, signal.SIGKILL):
+        if number is not None:
+            process.send_signal(number)
+        with suppress(TimeoutError):
+            async with asyncio.timeout(END_SECONDS):
+                await process.wait()
+            return

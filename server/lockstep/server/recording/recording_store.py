@@ -157,9 +157,9 @@ class RecordingStore:
         except (RecordingError, OSError):
             return None
 
-    def recover(self) -> list[Path]:
-        """Complete and return the files that were interrupted."""
-        completed = []
+    def recover(self) -> int:
+        """Complete the files that were interrupted, and return their number."""
+        count = 0
         for path in self.files():
             try:
                 if _is_locked(path):
@@ -172,11 +172,11 @@ class RecordingStore:
                     path.unlink()
                     continue
                 complete_file(path, info)
-                completed.append(path)
+                count += 1
                 log.warning("an interrupted recording was completed", file=path.name)
             except (RecordingError, OSError) as error:
                 log.error("an interrupted recording cannot be completed", file=path.name, reason=str(error))
-        return completed
+        return count
 
     def prune(self, keep: Collection[Path] = ()) -> list[str]:
         """Delete recordings that are too old, and the oldest while there are too many bytes; return their ids.

@@ -34,7 +34,8 @@ class Retention:
     def _prepare(self) -> tuple[list[str], EpisodeBefore | None]:
         try:
             self._store.prepare()
-            before = episode_before(self._store, set(self._store.recover()), time.time())
+            self._store.recover()
+            before = episode_before(self._store, time.time())
             return self._store.prune(), before
         except OSError as error:
             log.error("the directory of recordings cannot be used", reason=str(error))

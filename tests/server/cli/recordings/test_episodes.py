@@ -63,6 +63,7 @@ def test_the_episodes_of_all_recordings_are_listed_and_chosen_by_what_they_are(d
     _lockstep(directory, "episodes", "two", "--edit", "c", "--outcome", "success")
     words = _lockstep(directory, "episodes")
     assert words.exit_code == 0, words.output
+    assert "broken.mcap" in words.stderr
     assert [line for line in words.stdout.splitlines() if not line.startswith(" ")] == ["one", "two"]
     assert len(words.stdout.splitlines()) == 12
 
@@ -78,16 +79,22 @@ def test_the_episodes_of_all_recordings_are_listed_and_chosen_by_what_they_are(d
         ("two", ["e"]),
     ]
     assert ids("--only-driver", "Nobody") == []
-    assert "no such episode in" in _lockstep(directory, "episodes", "--only-driver", "Nobody").stderr
+    for file in ((), ("one",)):
+        assert (
+            "no episode that was asked for in" in _lockstep(directory, "episodes", *file, "--only-driver", "x").stderr
+        )
     one = json.loads(_lockstep(directory, "episodes", "one", "--only-task", "wipe", "--json").stdout)
     assert [each["id"] for each in one] == ["c"]
 
 
 def test_a_choice_does_not_say_which_episode_to_change(directory: Path) -> None:
     for arguments, words in (
-        (("one", "--edit", "a", "--only-task", "wipe", "--task", "x"), "--edit names the episode to change"),
+        (("one", "--edit", "a", "--only-task", "wipe", "--task", "x"), "--edit names the one to change"),
         (("--edit", "a", "--task", "x"), "name the recording"),
         (("--changes",), "name the recording"),
+        (("--after", "1"), "name the recording"),
+        (("one", "--after", "1"), "--after goes with a change"),
+        (("one", "--changes", "--only-task", "x"), "--only-… chooses the episodes that are listed"),
     ):
         found = _lockstep(directory, "episodes", *arguments)
         assert (found.exit_code, words in found.stderr) == (2, True), found.stderr

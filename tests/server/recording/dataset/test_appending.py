@@ -1,6 +1,7 @@
 """Datasets that grow by kept episodes: whole at any moment, whatever ends the process that appends."""
 
 import asyncio
+import json
 import os
 import random
 import re
@@ -155,7 +156,7 @@ def test_an_export_takes_the_wanted_episodes_alone_and_says_where_there_are_none
             {"layout": LayoutChoice(axes=["base.wz", "base.vx"])},
             "axes base.vx.vel, base.wz.vel and not base.wz, base.vx",
         ),
-        ({"layout": LayoutChoice(extras=["wrench"])}, "nothing and not wrench with it"),
+        ({"layout": LayoutChoice(extras=["wrench"])}, "none and not wrench as columns of their own"),
         ({"only": EpisodeFilter(tasks=["push"])}, "all of the kept episodes, and not those"),
     ],
 )
@@ -175,6 +176,16 @@ def test_a_dataset_refuses_other_options_than_those_that_it_was_made_with(
     assert not (root / "meta" / "info.json").exists(), "no episode is left"
     with pytest.raises(DatasetRefused, match="keeps what it was made with"):
         follower(root, **options)
+
+
+@pytest.mark.parametrize("features", [[], {"action": None}, {"action": {"names": [1]}}, {"action": {"names": {}}}])
+def test_metadata_that_somebody_has_damaged_refuses_options_by_name_too(tmp_path: Path, features: object) -> None:
+    path, root = recording(tmp_path / "a.mcap", *KEPT_AND_NOT), tmp_path / "dataset"
+    follower(root).look([path])
+    info = root / "meta" / "info.json"
+    info.write_text(json.dumps({**json.loads(info.read_text()), "features": features}))
+    with pytest.raises(DatasetRefused, match="and not base.vx"):
+        follower(root, layout=LayoutChoice(axes=["base.vx"]))
 
 
 def test_a_rate_that_was_chosen_is_kept_and_another_one_refused(tmp_path: Path) -> None:

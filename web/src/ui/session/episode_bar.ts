@@ -158,14 +158,15 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
     if (said?.type === "episode") {
       const before = left ?? leftEpisode(state);
       const message = withLeftEpisode(said, before);
-      const isSettled = left !== null && !said.reads_recordings;
-      left = said.reads_recordings ? before : null;
+      const isOpenQuestion = said.reads_recordings && message !== said;
+      const isAnswered = left !== null && !isOpenQuestion;
+      left = isOpenQuestion ? before : null;
       if (state?.task !== message.task && document.activeElement !== task && message.task !== "")
         task.value = message.task;
       if (hasLost(message) && message.last !== state?.last)
         note(engine.state, "error", `Episode: ${message.last}`, Date.now());
-      else if (isSettled && message.phase === "idle" && message.last !== "")
-        note(engine.state, "info", `Episode: ${message.last}`, Date.now());
+      else if (isAnswered && message.last !== "")
+        note(engine.state, message.lost === "" ? "info" : "error", `Episode: ${message.last}`, Date.now());
       const isSame = state?.phase === "open" && state.episode === message.episode;
       if (message.phase === "open" && !isSame) beganMs = state === null ? null : performance.now();
       [state, heardMs] = [message, performance.now()];

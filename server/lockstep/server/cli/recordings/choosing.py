@@ -27,7 +27,7 @@ OUTCOMES: dict[OutcomeWord, EpisodeOutcome] = {
 
 @dataclass(frozen=True)
 class EpisodeChoice:
-    """Options of a command (`with_options`); each list may be given several times, and one of its values is enough."""
+    """Options of a command (`with_options`). Those with a value may be given several times: one of them is enough."""
 
     only_task: Annotated[list[str] | None, typer.Option(help="Only episodes with this task.")] = None
     only_outcome: Annotated[list[OutcomeWord] | None, typer.Option(help="Only episodes with this outcome.")] = None
@@ -38,8 +38,8 @@ class EpisodeChoice:
 
     def filter(self) -> EpisodeFilter:
         return EpisodeFilter(
-            tasks=self.only_task or [],
-            outcomes=[OUTCOMES[each] for each in self.only_outcome or []],
-            drivers=self.only_driver or [],
+            tasks=sorted(set(self.only_task or [])),
+            outcomes=[OUTCOMES[each] for each in OutcomeWord if each in (self.only_outcome or [])],
+            drivers=sorted(set(self.only_driver or [])),
             without_problems=self.only_without_problems,
         )

@@ -67,9 +67,7 @@ def add_episode_command(app: typer.Typer, make_settings: MakeSettings) -> None:
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
-        only_state: Annotated[
-            list[StateWord] | None, typer.Option(help="List only episodes of which this became.")
-        ] = None,
+        only_state: Annotated[list[StateWord] | None, typer.Option(help="List only episodes in this state.")] = None,
         as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
         *,
         options: EpisodeChoice,
@@ -92,13 +90,18 @@ def add_episode_command(app: typer.Typer, make_settings: MakeSettings) -> None:
             raise _usage("--edit names the episode to change")
         chosen = _Choice(options.filter(), only_state or [])
         if file is None:
-            if change.kinds or edit or changes:
+            if change.kinds or edit or changes or after is not None:
                 raise _usage("name the recording whose episodes to change, or whose changes to list")
-            _list_all(recording_store(settings, robot, directory), chosen, as_json=as_json)
+            try:
+                _list_all(recording_store(settings, robot, directory), chosen, as_json=as_json)
+            except OSError as error:
+                raise _usage(str(error)) from error
             return
         path = recording_file(file, settings, robot, directory)
-        if change.kinds and chosen:
-            raise _usage("--only-… chooses what is listed; --edit names the episode to change")
+        if chosen and (change.kinds or edit or changes):
+            raise _usage("--only-… chooses the episodes that are listed; --edit names the one to change")
+        if after is not None and not change.kinds:
+            raise _usage("--after goes with a change")
         try:
             found = _found(path, edit, change, after)
         except (RecordingError, OSError, msgspec.ValidationError) as error:
@@ -109,6 +112,8 @@ def add_episode_command(app: typer.Typer, make_settings: MakeSettings) -> None:
             sys.stdout.write(msgspec.json.encode(told).decode() + "\n")
         else:
             _write(map(_change_line, found.changes) if changes else map(_line, listed))
+        if not (changes or listed):
+            typer.echo(f"lockstep: {_none(chosen)} in {escaped(path)}", err=True)
 
 
 class _Choice(NamedTuple):
@@ -126,25 +131,28 @@ class _Choice(NamedTuple):
 
 
 def _list_all(store: RecordingStore, chosen: _Choice, *, as_json: bool) -> None:
-    """List the episodes of all recordings that are complete, oldest first; one that cannot be read is said."""
+    """List the episodes of all recordings, oldest first, also of one that is written; say which cannot be read."""
     found = []
-    for entry in reversed(store.entries()):
-        path = store.path(entry.id)
+    for path in sorted(store.files(), key=lambda each: each.name):
         try:
-            of_one = None if path is None else _found(path, "", EpisodeEdit(at=0.0), None)
+            of_one = _found(path, "", EpisodeEdit(at=0.0), None)
         except (RecordingError, OSError) as error:
             typer.echo(f"lockstep: {escaped(error)}", err=True)
             continue
-        if of_one is not None and (listed := chosen.of(of_one.episodes)):
+        if listed := chosen.of(of_one.episodes):
             found.append(msgspec.structs.replace(of_one, episodes=listed))
     if as_json:
         sys.stdout.write(msgspec.json.encode(found).decode() + "\n")
-        return
-    for recording in found:
-        sys.stdout.write(printable(recording.info.id) + "\n")
-        _write(map(_line, recording.episodes))
+    else:
+        for recording in sorted(found, key=lambda each: each.info.started):
+            sys.stdout.write(printable(recording.info.id) + "\n")
+            _write(map(_line, recording.episodes))
     if not found:
-        typer.echo(f"lockstep: no such episode in {escaped(store.directory)}", err=True)
+        typer.echo(f"lockstep: {_none(chosen)} in {escaped(store.directory)}", err=True)
+
+
+def _none(chosen: _Choice) -> str:
+    return "no episode that was asked for" if chosen else "no episode"
 
 
 def _write(lines: Iterable[str]) -> None:

@@ -65,7 +65,7 @@ def add_export_command(app: typer.Typer, make_settings: MakeSettings) -> None:
             typer.Option("--whole", help=DATASET + "take each file without episodes as one in any case."),
         ] = False,
         kept: Annotated[
-            bool, typer.Option("--kept", help="csv, parquet, rerun, rosbag2: without what is of no kept episode.")
+            bool, typer.Option("--kept", help="csv, parquet, rerun, rosbag2: only what was driven in kept episodes.")
         ] = False,
         append: Annotated[bool, typer.Option("--append", help=DATASET + "append what the dataset has not.")] = False,
         follow: Annotated[
@@ -105,9 +105,9 @@ def add_export_command(app: typer.Typer, make_settings: MakeSettings) -> None:
             raise usage_error("--out takes one recording at a time, but for lerobot")
         # Loaded only here: what needs no extra takes none.
         exporter: Any = load_extra(f"lockstep.server.recording.export.export_{to.value}", EXTRA_OF.get(to, "export"))
-        rows = {"kept": True} if kept else {}
+        further = {"kept": True} if kept else {}
         for path in paths:
-            for each in or_usage(partial(exporter.export, path, out, task, **rows)):
+            for each in or_usage(partial(exporter.export, path, out, task, **further)):
                 _say(escaped(each))
 
 

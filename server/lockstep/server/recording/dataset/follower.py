@@ -27,9 +27,9 @@ from lockstep.server.recording.export.export_lerobot import (
     cameras_of,
     left_out,
     new_state,
-    no_choice,
     no_rows,
     not_as_a_whole,
+    why_not_wanted,
 )
 from lockstep.server.recording.export.lerobot_batch import DatasetState
 from lockstep.server.recording.export.lerobot_layout import DatasetLayout, layout_of
@@ -267,7 +267,7 @@ class DatasetFollower:
             return False
         found = None if self._state is None else present(self._state.notes.episodes, stretch)
         if found is None:
-            if why := no_choice(stretch, self._options.only if self._state is None else self._state.notes.only):
+            if why := why_not_wanted(stretch, self._options.only if self._state is None else self._state.notes.only):
                 self._pass_over(file, _key(stretch, why), left_out(stretch.path, stretch.episode, why))
             return not why and _key(stretch) not in file.passed
         if not found.is_same or found.other_task:

@@ -41,17 +41,16 @@ def _differences(options: DatasetOptions, notes: DatasetNotes, info: dict[str, A
     cameras = [topic.removeprefix(CAMERA) for topic in notes.topics]
     if options.cameras and sorted(options.cameras) != sorted(cameras):
         yield f"the cameras {_listed(cameras)} and not {_listed(options.cameras)}"
-    features = info.get("features", {})
     columns = (
         ("axes", "action", options.layout.axes, notes.layout.axes),
         ("state", "observation.state", options.layout.state, notes.layout.state),
     )
     for word, column, wanted, chosen in columns:
-        there = features.get(column, {}).get("names") or chosen
+        there = _names_in(info, column) or chosen
         if wanted and not _are_same(wanted, there):
-            yield f"{word} {_listed(there)} and not {_listed(wanted)}"
+            yield f"{word} {_listed(there) if there else 'as they are unset'} and not {_listed(wanted)}"
     if options.layout.extras and sorted(options.layout.extras) != sorted(notes.layout.extras):
-        yield f"{_listed(notes.layout.extras) or 'nothing'} and not {_listed(options.layout.extras)} with it"
+        yield f"{_listed(notes.layout.extras)} and not {_listed(options.layout.extras)} as columns of their own"
     if options.only and options.only != notes.only:
         yield f"{'some' if notes.only else ALL} of the kept episodes, and not those that --only-… chooses now"
 
@@ -62,5 +61,13 @@ def _are_same(wanted: Sequence[str], names: Sequence[str]) -> bool:
     return len(wanted) == len(names) and all(name in (each, f"{each}.pos", f"{each}.vel") for each, name in pairs)
 
 
+def _names_in(info: dict[str, Any], column: str) -> list[str]:
+    """Return the names of a column's values; empty: whoever wrote the file did not say them."""
+    features = info.get("features")
+    feature = features.get(column) if isinstance(features, dict) else None
+    names = feature.get("names") if isinstance(feature, dict) else None
+    return [str(name) for name in names] if isinstance(names, list) else []
+
+
 def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names)
+    return ", ".join(names) or "none"

@@ -122,7 +122,7 @@ class EpisodeCore:
         current = self._open(episode)
         current.last_event = place.event
         self.current = None
-        self.history.discard(current.number)
+        self.history.discard(current.id, current.number)
         return [Write(current.record("discarded", place, by)), Ended("discarded"), *_reset(self.next, now)]
 
     def redo(self, episode: str, by: str, place: Place, now: float) -> list[Effect]:
@@ -156,7 +156,7 @@ class EpisodeCore:
         if current is None or not current.is_keeping or current.id != episode:
             return []
         self.current = None
-        self.history.keep(current.number)
+        self.history.keep(current.id, current.number)
         return [Ended("kept"), *_reset(self.next, now)]
 
     def noted(self, text: str, place: Place) -> list[Effect]:
@@ -176,7 +176,7 @@ class EpisodeCore:
         if current.is_keeping and why not in ("recording_failed", "new_part"):
             return []
         self.current = None
-        self.history.cut(current.number, why)
+        self.history.cut(current.id, current.number, why)
         if current.is_keeping:
             return [Ended("cut")]
         return [Write(current.record("cut", place._replace(epoch=current.epoch), "", why=why)), Ended("cut")]

@@ -23,11 +23,12 @@ class EpisodeHistory:
         number: of the newest episode; all counts begin anew with each recording
         last: what became of the last one, in words
         lost: why the last one was lost; "": it was not
+        last_id: the last one; "": it did not begin
     """
 
     def __init__(self) -> None:
         self.number = self.kept = self.discarded = self.cuts = 0
-        self.last = ""
+        self.last = self.last_id = ""
         self.lost: EpisodeCut | Literal[""] = ""
         self._recording = ""
 
@@ -39,41 +40,41 @@ class EpisodeHistory:
         self.number += 1
         return self.number
 
-    def keep(self, number: int) -> None:
+    def keep(self, id: str, number: int) -> None:
         """The episode is on the disk."""
         self.kept += 1
-        self.last, self.lost = f"episode {number} is kept", ""
+        self.last_id, self.last, self.lost = id, f"episode {number} is kept", ""
 
-    def discard(self, number: int) -> None:
+    def discard(self, id: str, number: int) -> None:
         """A person discarded the episode."""
         self.discarded += 1
-        self.last, self.lost = f"episode {number} is discarded", ""
+        self.last_id, self.last, self.lost = id, f"episode {number} is discarded", ""
 
-    def cut(self, number: int, why: EpisodeCut) -> None:
+    def cut(self, id: str, number: int, why: EpisodeCut) -> None:
         """Something else than a person ended the episode."""
         self.cuts += 1
-        self.last, self.lost = _lost_words(number, why), why
+        self.last_id, self.last, self.lost = id, _lost_words(number, why), why
 
-    def begin_after(self, number: int, end: str, why: EpisodeCut) -> None:
+    def begin_after(self, id: str, number: int, state: str, why: EpisodeCut) -> None:
         """Say what became of an episode that an earlier process has recorded, unless there is a newer one.
 
         It is in no count.
 
         Args:
-            end: "kept", "discarded", or another word: it is lost
+            state: "kept", "discarded", or another word: it is lost
             why: it is lost
         """
         if self.number or self.last:
             return
-        self.number = number
-        if end in ("kept", "discarded"):
-            self.last, self.lost = f"episode {number} is {end}", ""
+        self.last_id, self.number = id, number
+        if state in ("kept", "discarded"):
+            self.last, self.lost = f"episode {number} is {state}", ""
         else:
             self.last, self.lost = _lost_words(number, why), why
 
     def cancel(self, why: str) -> None:
         """The episode was cancelled before it began; `why`: in words, or ""."""
-        self.last, self.lost = f"cancelled before it began: {why}".rstrip(": "), ""
+        self.last_id, self.last, self.lost = "", f"cancelled before it began: {why}".rstrip(": "), ""
 
 
 def _lost_words(number: int, why: EpisodeCut) -> str:

@@ -173,6 +173,7 @@ class EpisodeService:
             discarded=history.discarded,
             cut=history.cuts,
             last=history.last,
+            last_episode=history.last_id,
             lost=history.lost,
             reads_recordings=self._reads_recordings,
             reset_action=self._reset.name,
@@ -234,11 +235,11 @@ class EpisodeService:
 
     # RecordingWatcher
 
-    def recordings_read(self, before: EpisodeBefore | None) -> None:
+    def recordings_read(self, earlier: EpisodeBefore | None) -> None:
         self._reads_recordings = False
-        if before is not None:
-            self._core.history.begin_after(before.number, before.end, before.why)
-            self._core.task = self._core.task or printable(before.task)
+        if earlier is not None:
+            self._core.history.begin_after(earlier.id, earlier.number, earlier.state, earlier.why)
+            self._core.task = self._core.task or printable(earlier.task)
         self._tell()
 
     def recording_ends(self, failure: str) -> None:

@@ -42,7 +42,7 @@ __all__ = [
     "export_all",
     "left_out",
     "new_state",
-    "no_choice",
+    "why_not_wanted",
     "no_rows",
     "not_as_a_whole",
     "options_of",
@@ -152,7 +152,7 @@ def no_rows(tolerance: int) -> str:
     )
 
 
-def no_choice(stretch: Stretch, only: EpisodeFilter) -> str:
+def why_not_wanted(stretch: Stretch, only: EpisodeFilter) -> str:
     """Return in words why a stretch is not wanted; "" if it is."""
     if only and not stretch.episode:
         return "it has no episodes to choose from"
@@ -207,7 +207,7 @@ def _read(
             if sorted(topics) != sorted(cameras):
                 raise RecordingDamaged(f"{path.name} has other cameras than {paths[0].name}")
             for stretch in stretches_of(reader, now, options.task):
-                if why := no_choice(stretch, options.only):
+                if why := why_not_wanted(stretch, options.only):
                     say(left_out(path, stretch.episode, why))
                     continue
                 if found := present([noted(each) for each in episodes if each.frames], stretch):

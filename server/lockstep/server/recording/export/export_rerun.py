@@ -40,10 +40,10 @@ def export(path: Path, out: Path | None, task: str, *, kept: bool = False) -> li
     return [target]
 
 
-def _write(reader: RecordingReader, session: SessionLog, only: KeptRecords | None) -> None:
+def _write(reader: RecordingReader, session: SessionLog, kept_records: KeptRecords | None) -> None:
     session.begin(reader.description())
     for record in reader.records():
-        if only is not None and not only.takes(record):
+        if kept_records is not None and not kept_records.takes(record):
             session.leave_out(record.topic)
             continue
         at = Moment(record.event, record.arrived, record.captured)

@@ -69,9 +69,9 @@ def export(path: Path, out: Path | None, task: str, *, kept: bool = False) -> li
                 Writer(partial, version=VERSION, storage_plugin=StoragePlugin.MCAP) as writer,
             ):
                 bag = _Bag(writer, reader, description)
-                only = KeptRecords(episodes_now(reader)) if kept else None
+                kept_records = KeptRecords(episodes_now(reader)) if kept else None
                 for record in reader.records():
-                    if only is None or only.takes(record):
+                    if kept_records is None or kept_records.takes(record):
                         bag.take(record)
                     else:
                         bag.leave_out(record)
@@ -115,7 +115,7 @@ class _Bag:
                 self._write("/tf_static", "tf2_msgs/msg/TFMessage", record.arrived, message)
 
     def leave_out(self, record: Record) -> None:
-        """Take no notice of a record, but that later pictures may build on it."""
+        """Leave a record out; pictures that build on it are left out until the next keyframe."""
         if record.topic == DEGRADED:
             self._whole.clear()
         else:

@@ -37,7 +37,15 @@ def verify_file(path: Path, key: str = "") -> Verdict:
         RecordingDamaged: it is no recording at all.
         OSError: it cannot be read.
     """
-    written = _is_written(path)  # asked first: it may end meanwhile, and then it is whole
+    written = _is_written(path)
+    verdict, ended = _verify(path, key, written=written)
+    if written and ended:  # it has ended meanwhile, and is whole by now
+        verdict, _ = _verify(path, key, written=_is_written(path))
+    return verdict
+
+
+def _verify(path: Path, key: str, *, written: bool) -> tuple[Verdict, bool]:
+    """Return the verdict, and whether a file without an index was found to have an end."""
     with RecordingReader(path) as reader:
         verifier = Verifier(reader.info.epoch)
         if reader.interrupted:
@@ -50,7 +58,7 @@ def verify_file(path: Path, key: str = "") -> Verdict:
         with RecordingReader(path, scan.index if scan.ended else reader.index) as judged:
             ended = _show_records(verifier, judged, reader.index)
         _show_signatures(verifier, path, reader, scan, key, written=written)
-        return verifier.verdict(ended)
+        return verifier.verdict(ended), scan.ended and reader.interrupted
 
 
 def _is_written(path: Path) -> bool:

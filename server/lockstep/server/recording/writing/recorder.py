@@ -47,8 +47,8 @@ class RecordedMedia(Protocol):
 class RecordingWatcher(Protocol):
     """Is told of what concerns episodes. All methods are called on the loop and return at once."""
 
-    def recordings_read(self, before: EpisodeBefore | None) -> None:
-        """What earlier processes have recorded is complete by now; `before` is the last episode of it."""
+    def recordings_read(self, earlier: EpisodeBefore | None) -> None:
+        """What earlier processes have recorded is complete by now; `earlier` is the last episode of it."""
 
     def recording_ends(self, failure: str) -> None:
         """The recording ends; without a failure what is put into it now is still written."""

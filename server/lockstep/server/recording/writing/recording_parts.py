@@ -166,6 +166,8 @@ class RecordingParts:
                 self._is_keeping = True
                 self._writer.flush()
                 self._is_keeping, kept = False, True
+            elif record.kind == "start":
+                self._writer.flush()  # so that the next process knows of it, if this one is killed
         if record.kind == "kept":
             self._on_episode(record.episode, kept)
 

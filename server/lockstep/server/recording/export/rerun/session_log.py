@@ -119,7 +119,7 @@ class SessionLog:
         self._make_room()
 
     def leave_out(self, topic: str) -> None:
-        """Take no notice of a record of this topic, but that later pictures may build on it."""
+        """Leave a record of this topic out; pictures that build on it are left out until the next keyframe."""
         if topic == DEGRADED:
             self._whole.clear()
         else:
