@@ -82,9 +82,9 @@ def _ask(address: str, fraction: float) -> None:
         typer.Exit: the answer is not yes.
     """
     typer.echo(
-        f"This MOVES the robot at {address}: the first axis that is driven by a rate, and the first that is driven to a\n"
-        f"goal, to and fro, by {fraction:.0%} of the limit. It begins the first action that moves the robot and needs no\n"
-        "answer, such as home or dock, presses STOP and releases it. Nobody may stand where the robot reaches.",
+        f"This MOVES the robot at {address}: the first axis that is driven by a rate, and the first goal axis, to and\n"
+        f"fro, by {fraction:.0%} of the limit. It begins the first action that moves the robot and asks nothing, such\n"
+        "as home or dock, presses STOP and releases it. Nobody may stand where the robot reaches.",
         err=True,
     )
     if not sys.stdin.isatty():
