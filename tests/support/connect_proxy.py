@@ -12,6 +12,7 @@ class ConnectProxy:
 
     def __init__(self) -> None:
         self.asked: list[str] = []
+        self._ends: set[asyncio.StreamWriter] = set()
         self._server: asyncio.Server | None = None
 
     @property
@@ -28,8 +29,11 @@ class ConnectProxy:
     ) -> None:
         assert self._server is not None
         self._server.close()
+        for end in self._ends:
+            end.transport.abort()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._ends.add(writer)
         head = (await reader.readuntil(b"\r\n\r\n")).decode()
         method, target, _ = head.split(" ", 2)
         if method != "CONNECT":
@@ -39,6 +43,7 @@ class ConnectProxy:
         self.asked.append(target)
         host, _, port = target.rpartition(":")
         there, back = await asyncio.open_connection(host, int(port))
+        self._ends.add(back)
         writer.write(b"HTTP/1.1 200 Connection established\r\n\r\n")
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(pump(reader, back))

@@ -195,6 +195,7 @@ class Between:
 
     def __init__(self, directory: Path, rig: Rig) -> None:
         self._certificate, self._rig = made_certificate(directory), rig
+        self._ends: set[asyncio.StreamWriter] = set()
 
     async def __aenter__(self) -> int:
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
@@ -204,11 +205,15 @@ class Between:
 
     async def __aexit__(self, *_: object) -> None:
         self._server.close()
+        for end in self._ends:
+            end.transport.abort()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._ends.add(writer)
         there, back = await asyncio.open_connection(
             "127.0.0.1", address_of_port(self._rig), ssl=console_context("any", None)
         )
+        self._ends.add(back)
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(pump(reader, back))
             tasks.create_task(pump(there, writer))

@@ -63,6 +63,7 @@ class TcpPath:
         join = self._tasks.create_task(self._join(reader, writer), name="TCP path")
         self._joins.add(join)
         join.add_done_callback(self._joins.discard)
+        join.add_done_callback(lambda _: self._end(writer))  # also of one that was cancelled before its first step
 
     async def _join(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._ends.add(writer)
