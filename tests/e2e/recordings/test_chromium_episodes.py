@@ -161,6 +161,6 @@ async def test_an_episode_that_was_open_when_the_console_ended_is_said_to_be_los
         await _shot(page_console.page, "console-ended")
         async with running_stack(tmp_path, settings=SETTINGS, extra=record, port=port):
             await expect(bar.locator(".episode-words")).to_have_text(
-                "Episode 1 is lost: the console has ended", timeout=30_000
+                "Episode 1 is lost: the console ended", timeout=30_000
             )
             await _shot(page_console.page, "console-again")
