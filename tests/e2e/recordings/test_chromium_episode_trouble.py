@@ -50,9 +50,7 @@ async def _taking(chromium: Browser, stack: Stack, name: str) -> AsyncIterator[t
         await console.until_live()
         await driver.take_seat()
         bar = console.page.locator(".episode-bar")
-        await bar.locator(".episode-task").fill("push the box")
-        await bar.locator(".episode-task").press("Enter")
-        await expect(bar.locator(".episode-words")).to_contain_text("Take 1")
+        await _begin(console, bar.locator(".episode-words"))
         await expect(bar.locator(".episode-problems")).to_be_hidden()
         yield bar, driver
         assert await findings(console.page) == []
